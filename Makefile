@@ -1,0 +1,40 @@
+# Each target sets everything up by itself: all it needs is GNU make and a Python of at least 3.11.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+READY := $(VENV)/ready
+
+.PHONY: reproduce test lint lab notebooks constraints clean
+
+reproduce: $(READY)  ## every paper's table beside ours, then real drives where ALTIJAX_DATA_DIR holds them
+	$(BIN)/python -m papers_repro
+
+test: $(READY)  ## all tests
+	$(BIN)/python -m pytest
+
+lint: $(READY)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+lab: $(READY)  ## JupyterLab at the quickstart
+	$(BIN)/jupyter lab notebooks/00_quickstart.ipynb
+
+notebooks: $(READY)  ## execute every notebook and store its pictures
+	$(BIN)/python notebooks/execute.py
+
+# No index address and no local path may get into the file, so uv's own lock is not used (CONTRIBUTING.md).
+constraints: $(READY)
+	$(BIN)/python -m pip install --quiet uv
+	$(BIN)/uv pip compile pyproject.toml --python-version 3.11 --universal --all-extras --no-annotate --no-header \
+	    --upgrade --quiet --output-file constraints.txt
+
+$(READY): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and \
+	    "AltiJAX needs Python 3.11 or newer, $(PYTHON) is " + sys.version.split()[0] + ": make PYTHON=python3.12 ...")'
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable '.[dev,lab,logs]'
+	@touch $(READY)
+
+clean:
+	rm -rf $(VENV) results

@@ -1,0 +1,110 @@
+"""Imports go one way, the core imports jax alone, and nothing that belongs to one machine is tracked."""
+
+import ast
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.docstrings import PACKAGE, imports_of, public_functions
+
+ROOT = PACKAGE.parent
+
+# Each level may import from the levels before it; modules of one level know nothing of each other.
+LEVELS = [
+    ["constants", "_shapes", "_safe"],
+    ["rotations", "signals", "least_squares"],
+    ["earth"],
+    ["motions", "sensors"],
+    ["altitude"],
+    ["metrics"],
+    ["recordings"],
+    ["datasets"],
+    ["estimates"],
+    ["plots"],
+]
+LEVEL = {name: number for number, names in enumerate(LEVELS) for name in names}
+CORE = {name for name in LEVEL if LEVEL[name] <= LEVEL["metrics"]}
+MODULES = sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem != "__init__")
+
+
+def imported(path: Path) -> set[str]:
+    """Dotted names a file imports; ``from altijax import x`` counts as altijax.x."""
+    names = set()
+    for node in imports_of(path):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif node.module == "altijax":
+            names |= {f"altijax.{alias.name}" for alias in node.names}
+        elif not isinstance(node, ast.Import):
+            assert node.level == 0 and node.module, f"{path.name}: relative import"
+            names.add(node.module)
+    return names
+
+
+def test_every_module_has_a_level_and_a_test() -> None:
+    assert set(MODULES) == set(LEVEL)
+    for module in MODULES:
+        if not module.startswith("_") and module != "constants":
+            assert (ROOT / "tests" / f"test_{module}.py").is_file(), module
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_imports_go_one_way(module: str) -> None:
+    for name in imported(PACKAGE / f"{module}.py"):
+        package, _, rest = name.partition(".")
+        if package == "altijax":
+            assert LEVEL[rest] < LEVEL[module], f"{module} imports {rest}"
+        elif module in CORE and package not in sys.stdlib_module_names:
+            assert package == "jax", f"{module} is core and imports {package}"
+
+
+def test_core_modules_have_public_functions() -> None:
+    for module in sorted(CORE - {"constants", "_shapes", "_safe"}):
+        assert len(public_functions(module)) >= 1, module
+
+
+def tracked() -> list[Path]:
+    listed = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True, text=True)
+    return [ROOT / name for name in listed.stdout.split("\0") if name]
+
+
+# Written in pieces, so that this file does not find itself.
+FORBIDDEN = re.compile(
+    "|".join(
+        [
+            "py" + r"pi\.org",
+            "python" + r"hosted\.org",
+            "registry" + r"\.npm",
+            "deb" + r"ian\.org",
+            "--(?:extra-)?" + "index-url",
+            "--find" + "-links",
+            "file:" + "//",
+            r"(?<![A-Za-z0-9_.~/\-])/(?:wo" + r"rk|tmp|ro" + r"ot|ho" + r"me|opt|usr|Users)/[A-Za-z0-9_.\-]+",
+        ]
+    )
+)
+
+
+def test_no_tracked_file_names_a_registry_or_a_path_of_one_machine() -> None:
+    found = []
+    for path in tracked():
+        if path.is_file() and b"\0" not in path.read_bytes():
+            for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+                if FORBIDDEN.search(line):
+                    found.append(f"{path.relative_to(ROOT)}:{number}: {line[:100]}")
+    assert not found, "\n".join(found)
+
+
+def test_import_is_light() -> None:
+    """Importing altijax loads neither pandas nor matplotlib nor Jupyter, and leaves jax's configuration alone."""
+    code = (
+        "import sys, jax; before = dict(jax.config.values); import altijax;"
+        "assert dict(jax.config.values) == before;"
+        "heavy = ('pandas', 'matplotlib', 'IPython', 'jupyterlab', 'pooch', 'scipy.signal');"
+        "print([module for module in heavy if module in sys.modules])"
+    )
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "[]"
