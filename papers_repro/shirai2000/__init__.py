@@ -1,0 +1,1 @@
+"""Shirai, Koizumi, Takemoto, Adachi (2000): altitude from accelerometer and vehicle speed sensor."""
