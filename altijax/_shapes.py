@@ -46,3 +46,31 @@ def require_shape(name: str, value: ArrayLike, shape: Shape) -> jax.Array:
         wanted = "(" + ", ".join(words) + ("," if len(words) == 1 else "") + ")"
         raise ValueError(f"{name} must have shape {wanted}, got {array.shape}")
     return array
+
+
+def record_field(record: object, name: str, shape: tuple[int, ...], dtype: jnp.dtype) -> jax.Array:
+    """Field of a record of parameters, where one number stands for all elements.
+
+    Parameters
+    ----------
+    record : object
+        Record of parameters.
+    name : str
+        Name of its field.
+    shape : tuple
+        Sizes of the whole array.
+    dtype : dtype
+        Precision of the series that the record meets.
+
+    Returns
+    -------
+    array
+        The field, of the given shape and precision.
+
+    Raises
+    ------
+    ValueError
+        If the field is neither one number nor of that shape.
+    """
+    value = jnp.asarray(getattr(record, name), dtype)
+    return jnp.full(shape, value) if value.ndim == 0 else require_shape(name, value, shape)

@@ -30,7 +30,7 @@ class Fit:
     rank : ()
         Number of directions that the residuals determine to working precision.
     steps : ()
-        Iterations used.
+        Evaluations of the residual and its Jacobian.
     status : ()
         0 converged, 1 steps used up, 2 residuals not finite at the start.
     """
@@ -58,7 +58,7 @@ def levenberg_marquardt(
     x0 : (parameters,)
         Where to begin.
     max_steps : int, optional
-        Bound on the iterations, rejected ones included.
+        Bound on the evaluations, those of rejected steps included.
     tolerance : float, optional
         Stop when a step changes the parameters, or is expected to lower the cost, by less than this fraction.
         Default: the square root of the precision for the step, the precision itself for the cost.
@@ -77,43 +77,45 @@ def levenberg_marquardt(
     eps = float(jnp.finfo(x0.dtype).eps)
     step_tolerance = eps**0.5 if tolerance is None else tolerance
     cost_tolerance = eps if tolerance is None else tolerance
+    identity = jnp.eye(x0.size, dtype=x0.dtype)
 
     def linearised(x: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
-        r, J = residual(x), jax.jacfwd(residual)(x)
+        r, J = jax.vmap(lambda direction: jax.jvp(residual, (x,), (direction,)), out_axes=(None, -1))(identity)
         return r @ r, J.T @ r, J.T @ J
-
-    identity = jnp.eye(x0.size, dtype=x0.dtype)
 
     def proceed(state: tuple) -> jax.Array:
         *_, steps, done = state
         return ~done & (steps < max_steps)
 
     def iterate(state: tuple) -> tuple:
-        x, cost, gradient, hessian, damping, steps, _ = state
-        step = -jnp.linalg.solve(hessian + damping * identity, gradient)
-        expected = step @ (damping * step - gradient)
-        r = residual(x + step)
-        new_cost = r @ r
-        accepted = new_cost <= cost  # False for NaN
-        done = (expected <= cost_tolerance * cost) | (
-            accepted & (jnp.linalg.norm(step) <= step_tolerance * (jnp.linalg.norm(x) + step_tolerance))
-        )
+        # The residual is traced at this one place, which keeps compilation short: the first trial is the start itself.
+        x, found, damping, trial, expected, steps, _ = state
+        tried = linearised(trial)
+        cost, new_cost = found[0], tried[0]
+        first = steps == 0
+        accepted = jnp.isfinite(tried[2]).all() & (new_cost <= cost)  # False for NaN
+        small = jnp.linalg.norm(trial - x) <= step_tolerance * (jnp.linalg.norm(x) + step_tolerance)
+        x = jnp.where(accepted, trial, x)
+        found = jax.tree.map(lambda new, old: jnp.where(accepted, new, old), tried, found)
         # A good prediction earns less damping (Nielsen's rule, without its memory).
         gain = (cost - new_cost) / jnp.where(expected > 0, expected, 1)
         eased = damping * jnp.clip(1 - (2 * gain - 1) ** 3, 0.1, 2.0)
-        moved = linearised(x + step)
-        kept = (cost, gradient, hessian)
-        x = jnp.where(accepted, x + step, x)
-        cost, gradient, hessian = jax.tree.map(lambda new, old: jnp.where(accepted, new, old), moved, kept)
-        return x, cost, gradient, hessian, jnp.where(accepted, eased, 8 * damping), steps + 1, done
+        damping = jnp.where(accepted, eased, 8 * damping)
+        cost, gradient, hessian = found
+        initial = 1e-4 * jnp.maximum(jnp.max(jnp.diag(hessian)), jnp.finfo(x0.dtype).tiny)
+        damping = jnp.where(first, initial, damping)
+        step = -jnp.linalg.solve(hessian + damping * identity, gradient)
+        expected = step @ (damping * step - gradient)
+        done = jnp.where(first, ~accepted, accepted & small) | (expected <= cost_tolerance * cost)
+        return x, found, damping, x + step, expected, steps + 1, done
 
-    cost, gradient, hessian = linearised(x0)
-    finite = jnp.isfinite(cost) & jnp.isfinite(hessian).all()
-    damping = 1e-4 * jnp.maximum(jnp.max(jnp.diag(hessian)), jnp.finfo(x0.dtype).tiny)
-    start = (x0, cost, gradient, hessian, damping, jnp.asarray(0), ~finite)
-    x, cost, _, hessian, _, steps, done = jax.lax.while_loop(proceed, iterate, start)
+    unknown = (jnp.full((), jnp.inf, x0.dtype), jnp.zeros_like(x0), identity)
+    zero = jnp.zeros((), x0.dtype)
+    start = (x0, unknown, zero, x0, zero, jnp.asarray(0), jnp.asarray(False))
+    x, (cost, _, hessian), _, _, _, steps, done = jax.lax.while_loop(proceed, iterate, start)
+    finite = jnp.isfinite(cost)
 
-    values, vectors = jnp.linalg.eigh(jnp.where(finite, hessian, identity))
+    values, vectors = jnp.linalg.eigh(hessian)
     floor = jnp.maximum(values[-1] * eps * x0.size, jnp.finfo(x0.dtype).tiny)
     covariance = (vectors / jnp.maximum(values, floor)) @ vectors.T
     status = jnp.where(finite, jnp.where(done, CONVERGED, STEPS_USED_UP), NOT_FINITE)

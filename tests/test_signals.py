@@ -80,6 +80,14 @@ def test_resampling_survives_repeated_stamps_and_one_sample() -> None:
     np.testing.assert_allclose(slope, (WALK[0, 56] - WALK[0, 55]) / 0.01, rtol=1e-9)
 
 
+def test_resampling_on_the_samples_still_has_a_slope() -> None:
+    """A delay is fitted from zero, where every time asked for lies on a sample: the slope of the interval before it."""
+    t = np.arange(7.0)
+    slopes = jax.jacfwd(lambda delay: s.resample(t + delay, t, t**2, 2.0)[0])(0.0)
+    np.testing.assert_allclose(slopes[1:], np.diff(t**2), atol=1e-12)
+    assert s.resample(t, t, t**2, 0.5)[1].all()
+
+
 @pytest.mark.parametrize("n", [8, 9, 200, 201])
 def test_fourier_reconstruction_is_exact_for_harmonics(n: int) -> None:
     """A trigonometric polynomial below half the sampling rate is found again, value and mean."""

@@ -1,0 +1,363 @@
+"""Recordings: files read, checked, and turned into streams in SI units and body axes, each on its own time stamps."""
+
+import html
+import math
+import warnings
+from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+
+from altijax.log_formats import Log, is_comma2k19, read_comma2k19, read_ulog
+from altijax.stream_checks import (
+    RecordingError,
+    RecordingWarning,
+    axes_to_matrix,
+    check_accelerometer_unit,
+    check_attitude_unit,
+    check_course_unit,
+    check_gravity,
+    check_gyro_unit,
+    check_position,
+    check_time_unit,
+    check_together,
+    clean_rows,
+)
+from altijax.tidy_folder import (
+    QUANTITIES,
+    WHEELS,
+    check_units,
+    is_tidy_folder,
+    read_tidy_folder,
+    wheel_from_pulses,
+)
+from altijax.ublox import read_ubx
+
+_ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
+_STREAMS = ("imu", "wheel", "gnss", "reference")
+_LOG_READERS = {".ulg": read_ulog, ".ubx": read_ubx}
+_NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "imu": (("ax", "ay", "az"),),
+    "wheel": (("speed",), *((name,) for name in WHEELS)),
+    "gnss": (("v_e", "v_n"), ("speed", "course")),
+    "reference": ((),),
+}
+_OPTIONAL: dict[str, set[str]] = {
+    "imu": {"temperature"},
+    "wheel": set(),
+    "gnss": {"v_u", "climb", "lat", "lon", "alt", "sd_e", "sd_n", "sd_u"},
+    "reference": {"roll", "pitch", "heading", "v_e", "v_n", "v_u", "lat", "lon", "alt"},
+}
+_SLOWEST = {"imu": 0.5, "wheel": 1.0, "gnss": 60.0, "reference": 60.0}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Recording:
+    """Streams of one recording, DataFrames indexed by ``t`` in s; None where there is no such stream.
+
+    ========== ============================== ==========================================================================
+    stream     columns                        unit
+    ========== ============================== ==========================================================================
+    imu        ax, ay, az                     m/s^2, specific force forward, left, up
+    ..         gx, gy, gz                     rad/s about forward, left, up; if recorded
+    ..         temperature                    degC; if recorded
+    wheel      speed                          m/s, mean of the wheels
+    ..         left, front_left, ...           m/s; the single wheels that were recorded
+    gnss       v_e, v_n, v_u                  m/s East, North, up; v_u is NaN where climb was not recorded
+    ..         lat, lon                       deg, as in the files (not rad); if recorded
+    ..         alt                            m; if recorded
+    ..         sd_e, sd_n, sd_u               m/s, the receiver's own standard deviations; if recorded
+    reference  roll, pitch, heading           rad
+    ..         v_e, v_n, v_u                  m/s
+    ..         lat, lon, alt                  deg, deg, m
+    ========== ============================== ==========================================================================
+
+    Of the optional columns of gnss and reference, and of temperature, single values may be NaN.
+
+    Attributes
+    ----------
+    name, description : str
+        What the recording is called and is.
+    imu, wheel, gnss, reference : DataFrame or None
+        The streams; a u-blox log without ESF messages is the only one without imu.
+    axes : str
+        The code by which sensor axes became body axes.
+    pulses_per_turn : float or None
+        Pulses of one wheel sensor in one turn of its wheel.
+    wheel_radius, track_width : float or None
+        Metres.
+    site_latitude : float or None
+        Geodetic latitude in rad.
+    site_height : float or None
+        Height in m.
+    source : str
+        Path of what was read.
+    notes : tuple of str
+        What was dropped, changed or ignored in reading.
+    """
+
+    name: str = ""
+    description: str = ""
+    imu: pd.DataFrame | None = None
+    wheel: pd.DataFrame | None = None
+    gnss: pd.DataFrame | None = None
+    reference: pd.DataFrame | None = None
+    axes: str = "FLU"
+    pulses_per_turn: float | None = None
+    wheel_radius: float | None = None
+    track_width: float | None = None
+    site_latitude: float | None = None
+    site_height: float | None = None
+    source: str = ""
+    notes: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        lines = [f"Recording {self.name!r}, axes {self.axes}: {self.description}", _formatted(self).to_string()]
+        return "\n".join(lines + [f"note: {note}" for note in self.notes])
+
+    def _repr_html_(self) -> str:
+        notes = "".join(f"<li>{html.escape(note)}</li>" for note in self.notes)
+        return (
+            f"<p><b>{html.escape(self.name)}</b>: {html.escape(self.description)}<br>axes {html.escape(self.axes)}, "
+            f"<code>{html.escape(self.source)}</code></p>{_formatted(self).to_html(border=0)}<ul>{notes}</ul>"
+        )
+
+
+def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[str, str] | None = None) -> Recording:
+    """Read a recording: a tidy folder, a comma2k19 segment, a PX4 ULog (.ulg) or a u-blox log (.ubx).
+
+    A tidy folder holds ``recording.toml`` and one CSV file (``.csv``, ``.csv.gz``, or ``.parquet``) a stream:
+
+    ============== =====================================================================================================
+    recording.toml name, description, axes; [wheel] pulses_per_turn, radius (m), track_width (m); [site] latitude (deg),
+                   height (m); [source] origin, licence; all of it optional
+    imu.csv        t, ax, ay, az; optional gx, gy, gz, temperature
+    wheel.csv      t and speed, or left, right, or front_left, front_right, rear_left, rear_right
+    pulses.csv     t, wheel (its name as above): one row a pulse, instead of wheel.csv; recorded as long as the IMU, for
+                   no pulse means standstill
+    gnss.csv       t and v_e, v_n, v_u, or speed, course (deg) and optionally climb; optional lat, lon (deg), alt,
+                   sd_e, sd_n, sd_u
+    reference.csv  t and any of roll, pitch, heading (rad), v_e, v_n, v_u, lat, lon (deg), alt
+    ============== =====================================================================================================
+
+    It keeps its times; the other formats start at 0 at the first IMU sample. Streams may start, stop and pause on their
+    own. What is wrong but leaves the rest usable is left out with a `RecordingWarning`, which also becomes a note.
+
+    Parameters
+    ----------
+    path : str or Path
+        Folder or log file.
+    axes : str, optional
+        Where the sensor's x, y and z point: F or B, L or R, U or D; overrides what the recording says.
+    units : mapping of str to str, optional
+        Units of a tidy folder where they are not those above, by quantity: ``time`` (s, ms, us, ns; all files),
+        ``accelerometer`` (m/s^2, g, mg, gal), ``gyro`` (rad/s, deg/s), ``speed`` (m/s, km/h, mph, kn; wheel.csv),
+        ``gnss_speed`` (the same; velocities and their deviations in gnss.csv), ``course`` (deg, rad; gnss.csv),
+        ``attitude`` (rad, deg; reference.csv). A unit that is stated is not doubted: its check is left out.
+
+    Returns
+    -------
+    recording : Recording
+        Streams in SI units and body axes (forward, left, up).
+
+    Raises
+    ------
+    RecordingError
+        If a file is damaged or its content cannot be right; it names file, line, column, what was seen and the fix.
+    FileNotFoundError
+        If there is nothing at `path`.
+    ValueError
+        If `axes` or `units` is not valid.
+    """
+    path, units = Path(path), dict(units or {})
+    check_units(units)
+    if axes is not None:
+        axes_to_matrix(axes)
+    problems: list[str] = []
+    notes: list[str] = []
+    reader = _log_reader(path)
+    if reader:
+        if units:
+            raise ValueError(f"units is for a tidy folder; the format of {path} fixes its units")
+        tables, sheet = reader(path, problems, notes)
+        stated: Collection[str] = QUANTITIES
+    else:
+        tables, sheet = read_tidy_folder(path, units, problems)
+        stated = units.keys()
+    if axes is None:
+        axes = sheet.get("axes", "FLU")
+        try:
+            axes_to_matrix(axes)
+        except ValueError as error:
+            raise RecordingError(f"recording.toml, {error}") from error
+    streams: dict[str, pd.DataFrame | None] = {}
+    for stream in _STREAMS:
+        table, imu = tables.get(stream), streams.get("imu")
+        if stream == "wheel" and "pulses" in tables and imu is not None:
+            table = wheel_from_pulses(tables["pulses"], sheet.get("wheel", {}), imu, problems)
+        streams[stream] = None if table is None else _stream(stream, table, stated, axes, problems)
+    check_together(streams, stated, problems)
+    for problem in problems:
+        warnings.warn(problem, RecordingWarning, stacklevel=2)
+    wheel, site = sheet.get("wheel", {}), sheet.get("site", {})
+    latitude = site.get("latitude")
+    for frame in streams.values():
+        if frame is not None:
+            frame.attrs = {}
+    return Recording(
+        name=sheet.get("name", path.resolve().name),
+        description=sheet.get("description", ""),
+        **streams,
+        axes=axes,
+        pulses_per_turn=wheel.get("pulses_per_turn"),
+        wheel_radius=wheel.get("radius"),
+        track_width=wheel.get("track_width"),
+        site_latitude=None if latitude is None else math.radians(latitude),
+        site_height=site.get("height"),
+        source=str(path),
+        notes=tuple(problems + notes),
+    )
+
+
+def describe(recording: Recording) -> pd.DataFrame:
+    """Rates, jitter and gaps of a recording's streams.
+
+    Parameters
+    ----------
+    recording : Recording
+        Any recording.
+
+    Returns
+    -------
+    table : DataFrame
+        One row a stream: number of samples; rate in Hz (from the median interval); dt_5 and dt_95, the 5 % and 95 %
+        quantiles of the interval in s; number of gaps (intervals above three medians) and the longest in s; first and
+        last time and duration in s; columns.
+    """
+    rows = {}
+    for stream in _STREAMS:
+        frame = getattr(recording, stream)
+        if frame is None:
+            continue
+        t = frame.index.to_numpy(float)
+        dt = np.diff(t)
+        usual = np.median(dt) if dt.size else np.nan
+        gaps = dt[dt > 3 * usual]
+        low, high = np.quantile(dt, [0.05, 0.95]) if dt.size else (np.nan, np.nan)
+        rows[stream] = {
+            "samples": len(t),
+            "rate": 1 / usual,
+            "dt_5": low,
+            "dt_95": high,
+            "gaps": len(gaps),
+            "longest_gap": gaps.max(initial=0.0),
+            "first": t[0],
+            "last": t[-1],
+            "duration": t[-1] - t[0],
+            "columns": ", ".join(frame.columns),
+        }
+    return pd.DataFrame.from_dict(rows, orient="index").rename_axis("stream")
+
+
+def _formatted(recording: Recording) -> pd.DataFrame:
+    table = describe(recording)
+    forms = {"rate": "{:.1f} Hz", "dt_5": "{:.4f} s", "dt_95": "{:.4f} s", "longest_gap": "{:.2f} s"}
+    forms |= dict.fromkeys(("first", "last", "duration"), "{:.2f} s")
+    return table.assign(**{name: table[name].map(form.format) for name, form in forms.items() if len(table)})
+
+
+def _log_reader(path: Path) -> Callable[[Path, list[str], list[str]], Log] | None:
+    """The reader of a log of another make, None for a tidy folder; raises for what is neither."""
+    if not path.exists():
+        raise FileNotFoundError(f"there is no file or folder {path}")
+    if path.is_file() and path.suffix.lower() in _LOG_READERS:
+        return _LOG_READERS[path.suffix.lower()]
+    if is_comma2k19(path):
+        return read_comma2k19
+    if path.is_dir() and is_tidy_folder(path):
+        return None
+    found = "a file" if path.is_file() else ", ".join(sorted(file.name for file in path.iterdir())) or "an empty folder"
+    raise RecordingError(
+        f"{path} is not a recording: expected a folder with imu.csv (and recording.toml, wheel.csv, gnss.csv, "
+        f"reference.csv), a comma2k19 segment (a folder with processed_log), a .ulg or a .ubx file; found {found}"
+    )
+
+
+def _stream(
+    stream: str, table: pd.DataFrame, stated: Collection[str], axes: str, problems: list[str]
+) -> pd.DataFrame | None:
+    """One stream in its final form, or None where nothing usable is left."""
+    file = table.attrs["file"]
+    reason = None
+    if not any(set(choice) <= set(table.columns) for choice in _NEEDED[stream]):
+        wanted = ", or ".join(" and ".join(choice) for choice in _NEEDED[stream])
+        reason = f"{file}: needs the columns {wanted} besides t and has {', '.join(table.columns)}; name them so"
+    else:
+        prepare = {"imu": _with_whole_gyro, "gnss": _with_one_velocity}.get(stream)
+        table = prepare(table, problems) if prepare else table
+        table = clean_rows(table, set(table.columns) - _OPTIONAL[stream], problems)
+        if len(table) < 2:
+            reason = f"{file}: has {len(table)} usable row(s) and needs 2; record it again"
+    if reason and stream == "imu":
+        raise RecordingError(reason)
+    if reason:
+        problems.append(f"{reason}; the stream is left out")
+        return None
+    if "time" not in stated:
+        check_time_unit(table, _SLOWEST[stream])
+    if stream == "imu":
+        table = _in_body_axes(table, stated, axes, problems)
+    elif stream == "wheel" and "speed" not in table.columns:
+        table.insert(1, "speed", table[[name for name in WHEELS if name in table.columns]].mean(axis=1))
+    elif stream == "gnss":
+        table = _with_velocity(table, stated)
+    elif stream == "reference" and "attitude" not in stated:
+        check_attitude_unit(table)
+    return table.set_index("t")
+
+
+def _with_whole_gyro(table: pd.DataFrame, problems: list[str]) -> pd.DataFrame:
+    there = [name for name in _GYRO if name in table.columns]
+    if 0 < len(there) < 3:
+        problems.append(
+            f"{table.attrs['file']}: of the gyro only {', '.join(there)} there; left out, gx, gy, gz go together"
+        )
+        return table.drop(columns=there)
+    return table
+
+
+def _with_one_velocity(table: pd.DataFrame, problems: list[str]) -> pd.DataFrame:
+    """The table with either v_e, v_n or speed, course; where nothing moves a missing course does not matter."""
+    table = check_position(table, problems)
+    if {"v_e", "v_n"} <= set(table.columns):
+        return table.drop(columns=["speed", "course"], errors="ignore")
+    return table.assign(course=table["course"].where(table["speed"] != 0, 0.0))
+
+
+def _with_velocity(table: pd.DataFrame, stated: Collection[str]) -> pd.DataFrame:
+    if "course" in table.columns:
+        if "course" not in stated:
+            check_course_unit(table)
+        course = np.radians(table["course"])
+        table = table.assign(v_e=table["speed"] * np.sin(course), v_n=table["speed"] * np.cos(course))
+    if "v_u" not in table.columns:
+        table = table.assign(v_u=table["climb"] if "climb" in table.columns else np.nan)
+    others = [name for name in table.columns if name not in ("t", *_VELOCITY, "speed", "course", "climb")]
+    return table[["t", *_VELOCITY, *others]]
+
+
+def _in_body_axes(table: pd.DataFrame, stated: Collection[str], axes: str, problems: list[str]) -> pd.DataFrame:
+    C = axes_to_matrix(axes)
+    for triad in (_ACCELEROMETER, _GYRO):
+        if triad[0] in table.columns:
+            # + 0.0 makes zeros positive that a reversed axis made negative.
+            rotated = C @ table[triad].to_numpy().T + 0.0
+            table = table.assign(**dict(zip(triad, rotated, strict=True)))
+    if "accelerometer" not in stated:
+        problems += check_accelerometer_unit(table)
+    problems += check_gravity(table, axes)
+    if "gx" in table.columns and "gyro" not in stated:
+        check_gyro_unit(table)
+    return table
