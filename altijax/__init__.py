@@ -49,3 +49,269 @@ References
 [us20060293826]  US patent application 2006/0293826: speed by dead reckoning with roll angle.
 [chalko2010]     Chalko: Combining accelerations and GPS-Doppler velocities. 2010.
 """
+
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+from altijax.altitude import (
+    elevation_by_norm,
+    elevation_by_slope,
+    horizontal_acceleration,
+    horizontal_distance,
+    slope_sine,
+    vertical_acceleration,
+)
+from altijax.doppler import (
+    DopplerReceiver,
+    course_to_velocity,
+    doppler_velocity,
+    velocity_to_course,
+)
+from altijax.earth import (
+    ecef_to_geodetic,
+    enu_axes,
+    enu_to_geodetic,
+    geodetic_to_ecef,
+    geodetic_to_enu,
+    normal_gravity,
+)
+from altijax.instruments import (
+    DOPPLER_1_HZ,
+    FIBRE_OPTIC_GYRO,
+    JA_5V,
+    MEMS_ACCELEROMETER,
+    MEMS_GYRO,
+    ND_PG1,
+    VIBRATION_GYRO,
+)
+from altijax.least_squares import (
+    Fit,
+    levenberg_marquardt,
+)
+from altijax.metrics import (
+    accuracy_denominator,
+    coverage,
+    rms,
+    rms_without_offset,
+)
+from altijax.motions import (
+    Readings,
+    Windsurfer,
+    flight_pose,
+    gybing_windsurfer,
+    ideal_readings,
+    road_pose,
+    windsurfer_pose,
+)
+from altijax.roads import (
+    Road,
+    SpeedProfile,
+    circular_road,
+    progress,
+    rest_to_rest,
+    road_curve,
+    slope_road,
+    winding_road,
+)
+from altijax.rotations import (
+    euler_to_matrix,
+    heading_to_yaw,
+    interpolate_rotations,
+    matrix_to_euler,
+    matrix_to_quaternion,
+    matrix_to_rotvec,
+    quaternion_to_matrix,
+    rotvec_to_matrix,
+    skew,
+    vee,
+    wrap_angle,
+    yaw_to_heading,
+)
+from altijax.sensors import (
+    Accelerometer,
+    Gyro,
+    accelerometer_output,
+    correct_accelerometer,
+    correct_gyro,
+    gyro_output,
+    saturated,
+)
+from altijax.signals import (
+    cumulative_integral,
+    derivative,
+    fourier_interval_means,
+    fourier_reconstruction,
+    low_pass,
+    resample,
+)
+from altijax.wheels import (
+    WheelSensor,
+    correct_wheel_speeds,
+    pulse_distance,
+    speed_from_pulses,
+    standstill_from_pulses,
+    way_from_pulses,
+    wheel_pulses,
+    wheel_speeds,
+    yaw_rate_from_wheels,
+)
+
+if TYPE_CHECKING:
+    from altijax.datasets import (
+        DatasetNotFoundError,
+        dataset_path,
+        list_datasets,
+        load_dataset,
+    )
+    from altijax.drives import (
+        gravity_at,
+    )
+    from altijax.estimates import (
+        Calibration,
+        calibrate,
+        estimate_elevation,
+        score_elevation,
+    )
+    from altijax.plots import (
+        plot_elevation,
+        plot_elevation_error,
+        plot_streams,
+    )
+    from altijax.recordings import (
+        Recording,
+        RecordingError,
+        RecordingWarning,
+        describe,
+        read_recording,
+    )
+
+# Files and tables need pandas, pictures matplotlib: both are imported on first use only.
+_LAZY = {
+    "Recording": "recordings",
+    "RecordingError": "recordings",
+    "RecordingWarning": "recordings",
+    "describe": "recordings",
+    "read_recording": "recordings",
+    "DatasetNotFoundError": "datasets",
+    "dataset_path": "datasets",
+    "list_datasets": "datasets",
+    "load_dataset": "datasets",
+    "gravity_at": "drives",
+    "Calibration": "estimates",
+    "calibrate": "estimates",
+    "estimate_elevation": "estimates",
+    "score_elevation": "estimates",
+    "plot_elevation": "plots",
+    "plot_elevation_error": "plots",
+    "plot_streams": "plots",
+}
+
+__all__ = [
+    "DOPPLER_1_HZ",
+    "FIBRE_OPTIC_GYRO",
+    "JA_5V",
+    "MEMS_ACCELEROMETER",
+    "MEMS_GYRO",
+    "ND_PG1",
+    "VIBRATION_GYRO",
+    "Accelerometer",
+    "Calibration",
+    "DatasetNotFoundError",
+    "DopplerReceiver",
+    "Fit",
+    "Gyro",
+    "Readings",
+    "Recording",
+    "RecordingError",
+    "RecordingWarning",
+    "Road",
+    "SpeedProfile",
+    "WheelSensor",
+    "Windsurfer",
+    "accelerometer_output",
+    "accuracy_denominator",
+    "calibrate",
+    "circular_road",
+    "correct_accelerometer",
+    "correct_gyro",
+    "correct_wheel_speeds",
+    "course_to_velocity",
+    "coverage",
+    "cumulative_integral",
+    "dataset_path",
+    "derivative",
+    "describe",
+    "doppler_velocity",
+    "ecef_to_geodetic",
+    "elevation_by_norm",
+    "elevation_by_slope",
+    "enu_axes",
+    "enu_to_geodetic",
+    "estimate_elevation",
+    "euler_to_matrix",
+    "flight_pose",
+    "fourier_interval_means",
+    "fourier_reconstruction",
+    "geodetic_to_ecef",
+    "geodetic_to_enu",
+    "gravity_at",
+    "gybing_windsurfer",
+    "gyro_output",
+    "heading_to_yaw",
+    "horizontal_acceleration",
+    "horizontal_distance",
+    "ideal_readings",
+    "interpolate_rotations",
+    "levenberg_marquardt",
+    "list_datasets",
+    "load_dataset",
+    "low_pass",
+    "matrix_to_euler",
+    "matrix_to_quaternion",
+    "matrix_to_rotvec",
+    "normal_gravity",
+    "plot_elevation",
+    "plot_elevation_error",
+    "plot_streams",
+    "progress",
+    "pulse_distance",
+    "quaternion_to_matrix",
+    "read_recording",
+    "resample",
+    "rest_to_rest",
+    "rms",
+    "rms_without_offset",
+    "road_curve",
+    "road_pose",
+    "rotvec_to_matrix",
+    "saturated",
+    "score_elevation",
+    "skew",
+    "slope_road",
+    "slope_sine",
+    "speed_from_pulses",
+    "standstill_from_pulses",
+    "vee",
+    "velocity_to_course",
+    "vertical_acceleration",
+    "way_from_pulses",
+    "wheel_pulses",
+    "wheel_speeds",
+    "winding_road",
+    "windsurfer_pose",
+    "wrap_angle",
+    "yaw_rate_from_wheels",
+    "yaw_to_heading",
+]
+
+
+def __getattr__(name: str) -> object:
+    if name in _LAZY.values():
+        return import_module(f"altijax.{name}")
+    if name not in _LAZY:
+        raise AttributeError(f"module 'altijax' has no attribute {name!r}")
+    return getattr(import_module(f"altijax.{_LAZY[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -150,15 +150,15 @@ def resample(
     t = require_shape("t", t, (None,))
     max_gap = require_shape("max_gap", max_gap, ())
     t_samples, x = _series(t_samples, values, axis, at_least=1, t_name="t_samples")
+    held = jnp.where(t < t_samples[0], t_samples[0], jnp.where(t > t_samples[-1], t_samples[-1], t))
     # A time on a sample counts to the interval before it, so that the derivative by time is never that of a point.
-    after = jnp.clip(jnp.searchsorted(t_samples, t, side="left"), min(1, t_samples.size - 1), t_samples.size - 1)
+    after = jnp.clip(jnp.searchsorted(t_samples, held, side="left"), min(1, t_samples.size - 1), t_samples.size - 1)
     before = jnp.clip(after - 1, 0, None)
     gap = t_samples[after] - t_samples[before]
-    fraction = jnp.where(gap > 0, jnp.clip(t - t_samples[before], 0, gap) / jnp.where(gap > 0, gap, 1), 0)
+    fraction = jnp.where(gap > 0, (held - t_samples[before]) / jnp.where(gap > 0, gap, 1), 0)
     at_t = x[..., before] + fraction * (x[..., after] - x[..., before])
     on_sample = (t == t_samples[before]) | (t == t_samples[after])
-    between = (t > t_samples[0]) & (t < t_samples[-1]) & (gap <= max_gap)
-    return jnp.moveaxis(at_t, -1, axis), on_sample | between
+    return jnp.moveaxis(at_t, -1, axis), on_sample | ((t == held) & (gap <= max_gap))
 
 
 def fourier_reconstruction(t: ArrayLike, values: ArrayLike, t_new: ArrayLike) -> jax.Array:

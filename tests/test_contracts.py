@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from altijax import motions, roads
 from tests.docstrings import Entry, public_functions, public_records, section
 
 CORE = [
@@ -23,16 +24,47 @@ CORE = [
     "signals",
     "least_squares",
     "earth",
+    "roads",
     "motions",
     "sensors",
+    "wheels",
+    "doppler",
     "altitude",
     "metrics",
 ]
-SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2}
+SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2}
+# Sizes of records that each constructor chooses for itself.
+FREE = {"terms", "legs", "waves"}
 BATCHES = [(), (5,), (2, 5)]
 
 FUNCTIONS = [pytest.param(f, id=f"{name}.{f.__name__}") for name in CORE for f in public_functions(name)]
 RECORDS = [pytest.param(r, id=f"{name}.{r.__name__}") for name in CORE for r in public_records(name)]
+
+
+POSITIVE = {
+    "speed": 10.0,
+    "cutoff": 2.0,
+    "dt": 0.1,
+    "max_gap": 0.25,
+    "way": 10.1,
+    "horizontal": 10.0,
+    "distance": 1.0,
+    "quiet": 0.15,
+    "radius": 50.0,
+    "bend_length": 90.0,
+    "hill_length": 80.0,
+    "duration": 20.0,
+    "ramp": 3.0,
+    "reach_length": 60.0,
+    "fall_start": 8.0,
+}
+# Records that have no nominal form are made by a constructor of theirs.
+ROAD = ([0.3, 0.2], [90.0, 60.0], [0.0, 1.0], [0.1, 0.05], [80.0, 50.0], [0.0, 1.0], 3.0)
+CONSTRUCTED = {
+    "Road": lambda: roads.winding_road(*map(jnp.asarray, ROAD)),
+    "SpeedProfile": lambda: roads.rest_to_rest(50.0, 20.0, 3.0),
+    "Windsurfer": lambda: motions.gybing_windsurfer(9.0, 1.0, 60.0, 40.0, 20.0),
+}
 
 
 def size(word: str) -> int:
@@ -57,8 +89,8 @@ def example(entry: Entry, batch: tuple[int, ...], dtype: type, seed: int) -> obj
     if name.startswith("C"):
         rotations = Rotation.random(int(np.prod(shape[:-2], initial=1)), rng=rng).as_matrix()
         values = rotations.reshape(shape)
-    elif name in ("t", "t_knots", "t_samples"):
-        values = np.broadcast_to(np.arange(shape[-1]) * 0.1, shape)
+    elif name in ("t", "t_knots", "t_samples", "t_pulses"):
+        values = np.broadcast_to(np.arange(shape[-1]) * 0.1, shape) if shape else np.array(0.7)
     elif name == "edges":
         values = np.linspace(0.03, 0.61, shape[-1])
     elif name == "gravity":
@@ -82,7 +114,8 @@ def record_or_option(entry: Entry, function: FunctionType, dtype: type) -> objec
     """A nominal record of the type named, the first of several options, or the default."""
     named = getattr(importlib.import_module(function.__module__), entry.slot.split(" ")[0], None)
     if is_dataclass(named):
-        return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), named())
+        record = CONSTRUCTED.get(entry.slot, named)()
+        return jax.tree.map(lambda leaf: jnp.asarray(leaf, dtype), record)
     if entry.slot.startswith("{"):
         return entry.slot[1:].split(",")[0].strip("\"'} ")
     raise LookupError(entry.slot)
@@ -161,7 +194,7 @@ def test_shapes(function: FunctionType, batch: tuple[int, ...]) -> None:
         else:
             record = getattr(importlib.import_module(function.__module__), entry.slot)
             for attribute in section(record, "Attributes"):
-                if attribute.shape is not None:
+                if attribute.shape is not None and not FREE & set(attribute.shape):
                     expected = (batch if attribute.batched else ()) + trailing(attribute)
                     assert getattr(value, attribute.name).shape == expected, attribute.name
 

@@ -2,8 +2,8 @@
 
     python -m altijax.samples.make_hill_road FOLDER
 
-Two legs with a stop between them; a consumer's MEMS unit, mounted a little askew; a pulse generator on each rear wheel; a
-Doppler receiver. What a unit's data sheet leaves open is drawn within its tolerances from a fixed seed.
+Two legs with a stop between them; a consumer's MEMS unit, mounted a little askew; a pulse generator on each rear
+wheel; a Doppler receiver. What a unit's data sheet leaves open is drawn within its tolerances from a fixed seed.
 """
 
 import gzip
@@ -20,7 +20,8 @@ import pandas as pd
 from altijax.doppler import DopplerReceiver, doppler_velocity
 from altijax.earth import enu_to_geodetic, normal_gravity
 from altijax.instruments import MEMS_ACCELEROMETER, MEMS_GYRO
-from altijax.motions import SpeedProfile, ideal_readings, road_pose, winding_road
+from altijax.motions import ideal_readings, road_pose
+from altijax.roads import SpeedProfile, winding_road
 from altijax.rotations import euler_to_matrix, matrix_to_euler, yaw_to_heading
 from altijax.sensors import accelerometer_output, gyro_output
 from altijax.wheels import WheelSensor, wheel_pulses
@@ -53,21 +54,21 @@ def simulate() -> dict[str, pd.DataFrame]:
     origin = jnp.array([*np.radians(ORIGIN_DEG[:2]), ORIGIN_DEG[2]])
     gravity = normal_gravity(origin[0], origin[2])
     road = winding_road(
-        jnp.radians(jnp.array([28.0, 16.0])),
-        jnp.array([260.0, 97.0]),
+        jnp.radians(jnp.array([16.0, 6.0])),
+        jnp.array([310.0, 127.0]),
         jnp.array([0.3, 1.9]),
-        jnp.array([0.05, 0.03]),
+        jnp.array([0.06, 0.025]),
         jnp.array([510.0, 173.0]),
         jnp.array([-0.4, 2.2]),
         jnp.asarray(-3.0),
     )
     road = replace(road, roll_gain=jnp.asarray(0.012))
     profile = SpeedProfile(
-        start=jnp.array([6.0, 52.0]),
-        stop=jnp.array([38.0, 78.0]),
-        ramp=jnp.array([8.0, 7.0]),
-        speed=jnp.array([11.5, 9.5]),
-        modulation=jnp.array([6.0]),
+        start=jnp.array([5.0, 50.0]),
+        stop=jnp.array([34.0, 76.0]),
+        ramp=jnp.array([12.0, 10.0]),
+        speed=jnp.array([13.0, 11.0]),
+        modulation=jnp.array([2.5]),
         wavenumber=jnp.array([2 * jnp.pi / 130]),
         phase=jnp.array([0.0]),
     )

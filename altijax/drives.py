@@ -1,0 +1,186 @@
+"""From a recording to arrays: the IMU on a uniform grid, the speed, gravity, and the reference to judge by."""
+
+import warnings
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax.constants import STANDARD_GRAVITY
+from altijax.earth import normal_gravity
+from altijax.recordings import Recording
+from altijax.signals import resample
+from altijax.wheels import WheelSensor, yaw_rate_from_wheels
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Drive:
+    """A recording's readings for elevation as arrays, times counted from the first IMU sample.
+
+    Attributes
+    ----------
+    t : (time,) s
+        Uniform grid at the IMU's usual rate.
+    f : (time, 3) m/s^2
+        Accelerometer readings in body axes.
+    yaw_rate : (time,) rad/s
+        Rate of turn.
+    gravity : () m/s^2
+        Magnitude of gravity.
+    supported : (time,)
+        False where the IMU or the speed has a gap, had not begun or had ended.
+    t_speed : (samples,) s
+        Times of the speed sensor.
+    speed : (samples,) m/s
+        Its readings.
+    from_wheel : ()
+        True where they are wheel speeds, False for GNSS ground speeds.
+    """
+
+    t: jax.Array
+    f: jax.Array
+    yaw_rate: jax.Array
+    gravity: jax.Array
+    supported: jax.Array
+    t_speed: jax.Array
+    speed: jax.Array
+    from_wheel: jax.Array
+
+
+def drive_arrays(recording: Recording, *, turns: bool) -> tuple[Drive, np.ndarray]:
+    """Readings of a recording as arrays; call it in double precision (`jax.enable_x64`).
+
+    Parameters
+    ----------
+    recording : Recording
+        With an IMU and wheel speeds or GNSS velocities.
+    turns : bool
+        Whether the rate of turn is wanted; it is zero otherwise.
+
+    Returns
+    -------
+    drive : Drive
+        The arrays.
+    t : ndarray
+        The grid's times on the recording's own axis.
+
+    Raises
+    ------
+    ValueError
+        If a stream is missing.
+    """
+    imu, start = imu_of(recording), start_of(recording)
+    t_imu = imu.index.to_numpy(float) - start
+    usual = float(np.median(np.diff(t_imu)))
+    t = np.linspace(0, t_imu[-1], round(t_imu[-1] / usual) + 1)
+    f, supported = resample(t, t_imu, imu[["ax", "ay", "az"]].to_numpy(), max(5 * usual, 0.1), axis=-2)
+    t_speed, speed = speed_readings(recording)
+    t_speed = t_speed - start
+    drive = Drive(
+        t=jnp.asarray(t),
+        f=f,
+        yaw_rate=_yaw_rate(recording, t) if turns else jnp.zeros_like(t),
+        gravity=jnp.asarray(gravity_at(recording)),
+        supported=supported & resample(t, t_speed, speed, max(5 * float(np.median(np.diff(t_speed))), 0.5))[1],
+        t_speed=jnp.asarray(t_speed),
+        speed=jnp.asarray(speed),
+        from_wheel=jnp.asarray(recording.wheel is not None),
+    )
+    return drive, t + start
+
+
+def speed_readings(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Times, on the recording's axis, and readings in m/s of its wheels, else of the GNSS ground speed.
+
+    Raises
+    ------
+    ValueError
+        If there is neither.
+    """
+    if recording.wheel is not None:
+        return recording.wheel.index.to_numpy(float), recording.wheel["speed"].to_numpy(float)
+    if recording.gnss is not None:
+        velocity = recording.gnss[["v_e", "v_n"]].dropna()
+        return velocity.index.to_numpy(float), np.hypot(velocity["v_e"].to_numpy(), velocity["v_n"].to_numpy())
+    raise ValueError(
+        f"recording {recording.name!r} has neither wheel speeds nor GNSS velocities, and a speed is needed: "
+        "add a wheel.csv, pulses.csv or gnss.csv"
+    )
+
+
+def imu_of(recording: Recording) -> pd.DataFrame:
+    """The IMU stream, which every method needs.
+
+    Raises
+    ------
+    ValueError
+        If it is missing or has fewer than 3 samples.
+    """
+    if recording.imu is None or len(recording.imu) < 3:
+        raise ValueError(f"recording {recording.name!r} has no IMU stream of at least 3 samples")
+    return recording.imu
+
+
+def start_of(recording: Recording) -> float:
+    """Time of the first IMU sample on the recording's axis, in s."""
+    return float(imu_of(recording).index[0])
+
+
+def reference_heights(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Times from the first IMU sample, and heights, of the reference within the IMU's span."""
+    if recording.reference is None or "alt" not in recording.reference:
+        raise ValueError(f"recording {recording.name!r} has no reference heights: a reference.csv with a column alt")
+    heights = recording.reference["alt"].dropna()
+    t = heights.index.to_numpy(float) - start_of(recording)
+    inside = (t >= 0) & (t <= imu_of(recording).index[-1] - start_of(recording))
+    return t[inside], heights.to_numpy(float)[inside]
+
+
+def gravity_at(recording: Recording) -> float:
+    """Gravity for a recording.
+
+    Parameters
+    ----------
+    recording : Recording
+        Any recording.
+
+    Returns
+    -------
+    gravity : float
+        Normal gravity in m/s^2 at the mean latitude and height of its GNSS stream, else of its site; a latitude
+        without a height is taken at height zero (1 km is 3 mm/s^2). 9.80665 where no latitude is known. The reference
+        is never asked.
+    """
+    gnss = recording.gnss
+    latitude, height = recording.site_latitude, recording.site_height
+    if gnss is not None and "lat" in gnss and gnss["lat"].notna().any():
+        latitude = float(np.radians(gnss["lat"].mean()))
+    if gnss is not None and "alt" in gnss and gnss["alt"].notna().any():
+        height = float(gnss["alt"].mean())
+    if latitude is None:
+        return STANDARD_GRAVITY
+    with jax.enable_x64(True):
+        return float(normal_gravity(latitude, 0.0 if height is None else height))
+
+
+def _yaw_rate(recording: Recording, t: np.ndarray) -> jax.Array:
+    """Rate of turn on the grid: from the wheels as the paper has it, else from the gyro."""
+    start, wheel = start_of(recording), recording.wheel
+    pairs = (("left", "right"), ("rear_left", "rear_right"), ("front_left", "front_right"))
+    pair = next((list(p) for p in pairs if wheel is not None and set(p) <= set(wheel)), None)
+    if wheel is not None and pair is not None and recording.track_width is not None:
+        sensor = WheelSensor(track_width=recording.track_width)
+        rate = yaw_rate_from_wheels(sensor, wheel[pair].to_numpy(float).T)
+        return resample(t, wheel.index.to_numpy(float) - start, rate, np.inf)[0]
+    imu = imu_of(recording)
+    if "gz" in imu:
+        return resample(t, imu.index.to_numpy(float) - start, imu["gz"].to_numpy(float), np.inf)[0]
+    warnings.warn(
+        f"recording {recording.name!r} has no rate of turn (left and right wheel speeds with a track width, or a "
+        "gyro): it is taken as zero, so that turns read as upward accelerations of v^2 w^2 / 2g",
+        stacklevel=4,
+    )
+    return jnp.zeros(t.size)

@@ -1,0 +1,373 @@
+"""The verbs: a recording in, a DataFrame out, one row an IMU sample; and the calibration of their constants.
+
+Everything is computed in double precision, whatever jax's flag says, on times counted from the first IMU sample. An
+estimate never looks at the recording's reference: `calibrate` may, up to `until`, and `score_elevation` does.
+"""
+
+import warnings
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax import metrics
+from altijax.drives import Drive, drive_arrays, imu_of, reference_heights, start_of
+from altijax.elevation_model import (
+    ELEVATION_METHODS,
+    NOMINAL,
+    PARAMETERS,
+    UNCERTAINTY,
+    elevation,
+    elevation_and_sensitivity,
+    elevation_std,
+    uncertain_constants,
+)
+from altijax.least_squares import Fit, levenberg_marquardt
+from altijax.recordings import Recording
+
+# A direction of the parameters that the data see a hundred times less well than another.
+_BLIND = 1e-2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class Calibration:
+    """Constants fitted to a reference, how well they are known, and whether they help where they were not fitted.
+
+    Attributes
+    ----------
+    method : str
+        Method whose misfit was minimised.
+    values, std : Series
+        Value and standard deviation by parameter name.
+    correlation : DataFrame
+        Correlation between the parameters.
+    absorbed : DataFrame
+        By how much each value moves if one of the constants left at nominal (columns) is off by one unit.
+    held_out : DataFrame
+        One row a recording: last time used, and the misfit (RMS, its offset removed) with nominal and with fitted
+        constants, on what was fitted and on what was held out; NaN where nothing was.
+    """
+
+    method: str
+    values: pd.Series
+    std: pd.Series
+    correlation: pd.DataFrame
+    absorbed: pd.DataFrame
+    held_out: pd.DataFrame
+
+    def _table(self) -> pd.DataFrame:
+        return pd.DataFrame(
+            {"value": self.values, "std": self.std, "unit": PARAMETERS["unit"].reindex(self.values.index)}
+        )
+
+    def __repr__(self) -> str:
+        return f"Calibration of {self.method!r}\n{self._table()}\n{self.held_out.T}"
+
+    def _repr_html_(self) -> str:
+        title = f"<p>Calibration of <b>{self.method}</b>; RMS misfit where fitted and where held out</p>"
+        return title + self._table().to_html(border=0) + self.held_out.round(3).to_html(border=0)
+
+
+def estimate_elevation(
+    recording: Recording,
+    *,
+    method: str = "slope",
+    calibration: Calibration | None = None,
+    initial_vertical_speed: float | None = None,
+) -> pd.DataFrame:
+    """Elevation along a drive from accelerometer and speed sensor.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an IMU and wheel speeds, or else GNSS velocities, whose ground speed then serves; GNSS heights never do.
+    method : {"slope", "shirai"}
+        "shirai" integrates Eq. (1) of [shirai2000]_ twice; it takes the rate of turn from the wheels where left and
+        right are recorded and the track width is known, else from the gyro. "slope" integrates the road's slope once.
+    calibration : Calibration, optional
+        Constants from `calibrate`; nominal ones otherwise.
+    initial_vertical_speed : float, optional
+        In m/s, for "shirai"; it goes before the calibration's. By default the calibration's, else the slope's of the
+        first second, which is zero at standstill.
+
+    Returns
+    -------
+    estimate : DataFrame
+        Indexed as ``recording.imu``: elevation (m, zero at the first sample), elevation_std (m), way (m), horizontal
+        (m), vertical_speed (m/s), and valid, False where the IMU or the speed has a gap or had not begun. Without a
+        calibration of the constants the standard deviation is that of an uncalibrated consumer's instrument.
+
+    Raises
+    ------
+    ValueError
+        If the method is unknown or the recording lacks a stream that it needs.
+    """
+    _require_method(method)
+    with jax.enable_x64(True):
+        drive, grid = drive_arrays(recording, turns=method == "shirai")
+        values = {} if calibration is None else {str(name): jnp.asarray(v) for name, v in calibration.values.items()}
+        if initial_vertical_speed is not None:
+            values["initial_vertical_speed"] = jnp.asarray(float(initial_vertical_speed))
+        names, covariance = _spread(values, calibration, drive, method)
+        found, jacobian = elevation_and_sensitivity(values, drive, tuple(names), method)
+        found["elevation_std"] = elevation_std(found, jacobian, covariance, drive.t, method)
+        imu_index = imu_of(recording).index
+        t = imu_index.to_numpy(float)
+        columns = ("elevation", "elevation_std", "way", "horizontal", "vertical_speed")
+        estimate = pd.DataFrame(
+            {name: np.interp(t, grid, np.asarray(found[name])) for name in columns}, index=imu_index
+        )
+        estimate["valid"] = np.asarray(found["valid"])[np.clip(np.searchsorted(grid, t), 0, grid.size - 1)]
+    return estimate
+
+
+def calibrate(
+    recordings: Recording | Iterable[Recording],
+    parameters: str | Iterable[str],
+    *,
+    method: str,
+    until: float | None = None,
+) -> Calibration:
+    """Constants that bring a method's estimate closest to the reference, in least squares.
+
+    Parameters
+    ----------
+    recordings : Recording or several
+        With a reference of the quantity estimated (``alt``); the constants are common to them, a height offset is free
+        in each.
+    parameters : str or several
+        Names of `PARAMETERS`; the others keep their nominal values.
+    method : {"slope", "shirai"}
+        Method to calibrate.
+    until : float, optional
+        Last time, on the recordings' time axis, whose reference may be used; all of it by default. Afterwards the
+        reference only measures what the calibration is worth there (``held_out``).
+
+    Returns
+    -------
+    calibration : Calibration
+        Values, standard deviations and correlations, and the misfit before and after. The standard deviations count
+        neighbouring residuals as one observation as far as they are correlated; drift slower than what was fitted is
+        not in them.
+
+    Raises
+    ------
+    ValueError
+        If a name is unknown, a parameter changes nothing in this method, or the reference is missing or too short.
+
+    Warns
+    -----
+    UserWarning
+        If the data cannot tell some of the parameters apart.
+    """
+    _require_method(method)
+    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
+    names = [parameters] if isinstance(parameters, str) else list(parameters)
+    unknown = sorted(set(names) - set(PARAMETERS.index))
+    if unknown or not names or not recordings or len(set(names)) < len(names):
+        raise ValueError(
+            f"parameters must be different names out of {', '.join(PARAMETERS.index)}, for one recording or more; "
+            f"got {', '.join(names) or 'none'} for {len(recordings)} recording(s)"
+        )
+    if "initial_vertical_speed" in names and len(recordings) > 1:
+        raise ValueError("initial_vertical_speed belongs to one recording: calibrate it on one alone")
+    with jax.enable_x64(True):
+        drives = [drive_arrays(recording, turns=method == "shirai")[0] for recording in recordings]
+        references = [reference_heights(recording) for recording in recordings]
+        end = np.inf if until is None else until
+        fitted = [t[t <= end - start_of(r)].size for r, (t, _) in zip(recordings, references, strict=True)]
+        if min(fitted) < 3 or sum(fitted) < len(names) + len(recordings) + 1:
+            raise ValueError(
+                f"{len(names)} parameter(s) need more reference than {sum(fitted)} height(s) up to until={until}"
+            )
+        targets = [(t[:n], heights[:n]) for (t, heights), n in zip(references, fitted, strict=True)]
+        others = [name for name in uncertain_constants(drives[0], method) if name not in names]
+        if len(drives) > 1:
+            others = [name for name in others if name != "initial_vertical_speed"]  # each recording has its own
+        fit, residuals, full_jacobian = _fit(drives, targets, tuple(names), tuple(others), method)
+        jacobian = np.asarray(full_jacobian)[:, : len(names)]
+        _require_effect(names, jacobian, method)
+        _warn_of_what_cannot_be_told_apart(names, jacobian)
+        covariance = np.asarray(fit.covariance) * _residual_variance(np.asarray(residuals), fitted)
+        constants = _named(fit.x, tuple(names))
+        held_out = []
+        for recording, drive, target, n in zip(recordings, drives, references, fitted, strict=True):
+            nominal, best = (
+                np.asarray(_error({}, drive, target, method)),
+                np.asarray(_error(constants, drive, target, method)),
+            )
+            held_out.append(
+                {
+                    "recording": recording.name,
+                    "until": target[0][n - 1] + start_of(recording),
+                    "fitted_nominal": np.std(nominal[:n]),
+                    "fitted": np.std(best[:n]),
+                    "held_out_nominal": np.std(nominal[n:]) if n < nominal.size else np.nan,
+                    "held_out": np.std(best[n:]) if n < best.size else np.nan,
+                }
+            )
+    deviation = np.sqrt(np.diag(covariance))
+    absorbed = -np.linalg.lstsq(jacobian, np.asarray(full_jacobian)[:, len(names) :])[0]
+    units = PARAMETERS["uncertainty"]
+    return Calibration(
+        method=method,
+        values=pd.Series({name: float(value) for name, value in constants.items()}, name="value"),
+        std=units[names].rename("std") * deviation,
+        correlation=pd.DataFrame(covariance / np.outer(deviation, deviation), index=names, columns=names),
+        absorbed=pd.DataFrame(absorbed, names, others).mul(units[names], axis=0).div(units[others], axis=1),
+        held_out=pd.DataFrame.from_records(held_out, index="recording"),
+    )
+
+
+def score_elevation(estimate: pd.DataFrame, recording: Recording, *, after: float | None = None) -> pd.Series:
+    """Errors of an elevation estimate against the recording's reference.
+
+    Parameters
+    ----------
+    estimate : DataFrame
+        From `estimate_elevation`.
+    recording : Recording
+        The same recording, with ``alt`` in its reference.
+    after : float, optional
+        Score only what comes after this time, such as the end of what was calibrated on.
+
+    Returns
+    -------
+    score : Series
+        rms (m) with the first reference height in common, rms_without_offset (m), end_error (m), relief (m, highest
+        less lowest reference), way (m), way_per_error (the n of an accuracy 1/n of the end error), and coverage within
+        one and two standard deviations.
+
+    Raises
+    ------
+    ValueError
+        If the recording has no reference heights in the interval.
+    """
+    t, heights = reference_heights(recording)
+    keep = t > (-np.inf if after is None else after - start_of(recording))
+    if not keep.any():
+        raise ValueError(f"recording {recording.name!r} has no reference heights after {after} s")
+    start = start_of(recording)
+    t, heights = t[keep] + start, heights[keep]
+    at_reference = {
+        name: np.interp(t, estimate.index, estimate[name]) for name in ("elevation", "elevation_std", "way")
+    }
+    error = at_reference["elevation"] - heights
+    error -= error[0]
+    # relative to the first height scored, which is known
+    std = np.sqrt(np.maximum(at_reference["elevation_std"] ** 2 - at_reference["elevation_std"][0] ** 2, 0))
+    way = at_reference["way"][-1] - at_reference["way"][0]
+    with jax.enable_x64(True):
+        score = {
+            "rms": metrics.rms(error),
+            "rms_without_offset": metrics.rms_without_offset(error),
+            "end_error": error[-1],
+            "relief": np.ptp(heights),
+            "way": way,
+            "way_per_error": metrics.accuracy_denominator(way, error[-1]),
+            "within_1_std": metrics.coverage(error[1:], std[1:], 1.0),
+            "within_2_std": metrics.coverage(error[1:], std[1:], 2.0),
+        }
+        return pd.Series({name: float(value) for name, value in score.items()})
+
+
+def _require_method(method: str) -> None:
+    if method not in ELEVATION_METHODS:
+        raise ValueError(f"method must be one of {', '.join(ELEVATION_METHODS)}, got {method!r}")
+
+
+def _spread(
+    values: dict[str, jax.Array], calibration: Calibration | None, drive: Drive, method: str
+) -> tuple[list[str], np.ndarray]:
+    """Names and covariance of the constants that are not known exactly.
+
+    A calibrated constant has taken up what the others, left at nominal, did where it was fitted: it is off by its own
+    error and, against each of them, by what it absorbed.
+    """
+    names = [] if calibration is None else [str(name) for name in calibration.values.index if name in values]
+    others = {name: std for name, std in uncertain_constants(drive, method).items() if name not in values}
+    covariance = np.diag(np.square([*np.zeros(len(names)), *others.values()]))
+    if calibration is not None:
+        std = calibration.std[names].to_numpy()
+        own = calibration.correlation.loc[names, names].to_numpy() * np.outer(std, std)
+        absorbed = calibration.absorbed if calibration.method == method else pd.DataFrame()
+        gain = absorbed.reindex(index=names, columns=list(others)).fillna(0.0).to_numpy()
+        through = np.vstack([gain, np.eye(len(others))])
+        rest = np.diag(np.square(list(others.values())))
+        covariance = through @ rest @ through.T
+        covariance[: len(names), : len(names)] += own
+    return names + list(others), covariance
+
+
+def _named(x: jax.Array, names: tuple[str, ...]) -> dict[str, jax.Array]:
+    """Constants by name, from their deviations from nominal in units of their uncertainty."""
+    return {name: NOMINAL.get(name, 0.0) + UNCERTAINTY[name] * x[i] for i, name in enumerate(names)}
+
+
+@partial(jax.jit, static_argnames=("names", "others", "method"))
+def _fit(
+    drives: list[Drive],
+    targets: list[tuple[jax.Array, jax.Array]],
+    names: tuple[str, ...],
+    others: tuple[str, ...],
+    method: str,
+) -> tuple[Fit, jax.Array, jax.Array]:
+    """Least squares over all drives, with residuals and Jacobian (by `names`, then `others`) at the minimum."""
+
+    def residuals(values: dict[str, jax.Array]) -> jax.Array:
+        errors = [_error(values, drive, target, method) for drive, target in zip(drives, targets, strict=True)]
+        return jnp.concatenate([error - jnp.mean(error) for error in errors])
+
+    fit = levenberg_marquardt(lambda x: residuals(_named(x, names)), jnp.zeros(len(names)))
+    best = _named(fit.x, names)
+    if "initial_vertical_speed" in others:
+        best["initial_vertical_speed"] = elevation(best, drives[0], method)["vertical_speed"][0]
+    start = NOMINAL | best
+    both = names + others
+
+    def around_best(y: jax.Array) -> jax.Array:
+        return residuals({name: start[name] + UNCERTAINTY[name] * y[i] for i, name in enumerate(both)})
+
+    return fit, residuals(best), jax.jacfwd(around_best)(jnp.zeros(len(both)))
+
+
+@partial(jax.jit, static_argnames="method")
+def _error(values: dict[str, jax.Array], drive: Drive, target: tuple[jax.Array, jax.Array], method: str) -> jax.Array:
+    """Estimate less reference at the reference's times."""
+    t, heights = target
+    return jnp.interp(t, drive.t, elevation(values, drive, method)["elevation"]) - heights
+
+
+def _residual_variance(residuals: np.ndarray, counts: Sequence[int]) -> float:
+    """Variance of the residuals, times the number of neighbours that count as one for their correlation."""
+    together = 0.0
+    for part in np.split(residuals, np.cumsum(counts)[:-1]):
+        n = part.size
+        spectrum = np.abs(np.fft.rfft(part, 2 * n)) ** 2
+        correlation = np.fft.irfft(spectrum)[:n] / max(float(part @ part), np.finfo(float).tiny)
+        first_zero = int(np.argmax(correlation <= 0)) or n
+        together += n * (2 * correlation[:first_zero].sum() - 1)
+    return float(residuals @ residuals) / residuals.size * together / residuals.size
+
+
+def _require_effect(names: list[str], jacobian: np.ndarray, method: str) -> None:
+    idle = [name for name, column in zip(names, jacobian.T, strict=True) if not column.any()]
+    if idle:
+        raise ValueError(f"{', '.join(idle)}: changes nothing in method {method!r} on these recordings; leave it out")
+
+
+def _warn_of_what_cannot_be_told_apart(names: list[str], jacobian: np.ndarray) -> None:
+    """Name the parameters that a nearly blind direction mixes."""
+    _, singular, directions = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0), full_matrices=False)
+    for value, direction in zip(singular, directions, strict=True):
+        if value < _BLIND * singular[0]:
+            mixed = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
+            warnings.warn(
+                f"these data hardly tell {' and '.join(mixed)} apart: a combination of them is determined, the single "
+                "values are not; leave one out",
+                stacklevel=3,
+            )

@@ -1,0 +1,54 @@
+"""A recording by ideal sensors, whose truth is exact."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax.constants import STANDARD_GRAVITY
+from altijax.motions import ideal_readings, road_pose
+from altijax.recordings import Recording
+from altijax.roads import SpeedProfile, winding_road
+
+jax.config.update("jax_enable_x64", True)
+
+TRACK_WIDTH = 1.5
+
+
+def exact_drive(start: float = 0.0) -> Recording:
+    """Ideal sensors for 60 s over hills and bends, with a stop; IMU 50 Hz, wheels 20 Hz, GNSS 5 Hz, heights 10 Hz."""
+    road = winding_road(
+        jnp.array([0.4]),
+        jnp.array([200.0]),
+        jnp.array([0.5]),
+        jnp.array([0.06]),
+        jnp.array([300.0]),
+        jnp.array([0.3]),
+        -2.0,
+    )
+    profile = SpeedProfile(
+        start=jnp.array([3.0, 34.0]),
+        stop=jnp.array([26.0, 52.0]),
+        ramp=jnp.array([5.0, 4.0]),
+        speed=jnp.array([12.0, 9.0]),
+        modulation=jnp.zeros(0),
+        wavenumber=jnp.zeros(0),
+        phase=jnp.zeros(0),
+    )
+    t = np.linspace(0, 60, 3001)
+    truth = ideal_readings(partial(road_pose, road, profile), t, STANDARD_GRAVITY)
+    index = pd.Index(t + start, name="t")
+    imu = pd.DataFrame(np.hstack([truth.f_b, truth.w_b]), index=index, columns=["ax", "ay", "az", "gx", "gy", "gz"])
+    half = 0.5 * TRACK_WIDTH * np.asarray(truth.w_b[:, 2])
+    speed = np.asarray(truth.speed)
+    wheel = pd.DataFrame({"speed": speed, "left": speed - half, "right": speed + half}, index=index)
+    gnss = pd.DataFrame(np.asarray(truth.velocity), index=index, columns=["v_e", "v_n", "v_u"])
+    reference = pd.DataFrame({"alt": 500 + np.asarray(truth.position[:, 2])}, index=index)
+    return Recording(
+        name="exact", imu=imu, wheel=wheel[::2], gnss=gnss[::10], reference=reference[::5], track_width=TRACK_WIDTH
+    )
+
+
+EXACT = exact_drive()
