@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import fields, replace
 from functools import cache, partial
+from operator import itemgetter
 
 import jax
 import jax.numpy as jnp
@@ -11,14 +12,16 @@ import pytest
 from jax.flatten_util import ravel_pytree
 from scipy.spatial.transform import Rotation
 
-from altijax import motions, roads, rotations
+from altijax import motions, roads
 from altijax.motions import Readings, Windsurfer, flight_pose, ideal_readings, road_pose, windsurfer_pose
 from altijax.roads import Road, SpeedProfile
+from altijax.rotations import matrix_to_euler
 
 # Compiled whole, and with few shapes, these tests take a fraction of the time.
-matrix_to_euler = jax.jit(rotations.matrix_to_euler)
 circular_road = jax.jit(roads.circular_road)
 gybing_windsurfer = jax.jit(motions.gybing_windsurfer)
+# What runs once is not worth optimising.
+jit_once = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 
 G = 9.79
 WIND = np.array([3.0, -4.0, 0.5])
@@ -112,39 +115,50 @@ def windsurfer_poses(windsurfer: Windsurfer, t: jax.Array) -> tuple[jax.Array, j
     return jax.vmap(partial(windsurfer_pose, windsurfer))(t)
 
 
-def drive(road: Road, profile: SpeedProfile, t: np.ndarray) -> Readings:
-    """Readings on a road, at one number of times as well."""
-    readings = road_readings(*of_equal_shapes(road, profile), np.resize(t, TIMES.size))
-    return jax.tree.map(lambda x: np.asarray(x)[: t.size], readings)
-
-
-def split(readings: Readings) -> tuple[Readings, Readings]:
-    """At the edges of the panels, and at the nodes between."""
-    readings = jax.tree.map(np.asarray, readings)
-    return jax.tree.map(lambda x: x[: EDGES.size], readings), jax.tree.map(lambda x: x[EDGES.size :], readings)
-
-
-@cache
-def edges_and_nodes(name: str) -> tuple[Readings, Readings]:
-    if name in ROADS:
-        return split(drive(ROADS[name], STOPS, TIMES))
-    return split(flight_readings(FLIGHT, TIMES) if name == "flight" else windsurfer_readings(SURFER, TIMES))
-
-
 @jax.jit
-@partial(jax.vmap, in_axes=(None, None, 0))
-def euler_and_speed_with_their_rates(road: Road, profile: SpeedProfile, t: jax.Array) -> tuple:
+def road_readings_and_rates(road: Road, profile: SpeedProfile, t: np.ndarray) -> tuple[Readings, tuple]:
+    """Readings, and ((euler, speed), derivatives of both)."""
+
     def euler_and_speed(t: jax.Array) -> tuple[jax.Array, jax.Array]:
         (_, C_nb), (velocity, _) = jax.jvp(partial(road_pose, road, profile), (t,), (jnp.ones_like(t),))
         return matrix_to_euler(C_nb), C_nb[:, 0] @ velocity
 
-    return jax.jvp(euler_and_speed, (t,), (jnp.ones_like(t),))
+    rates = jax.vmap(lambda t: jax.jvp(euler_and_speed, (t,), (jnp.ones_like(t),)))(t)
+    return road_readings(road, profile, t), rates
+
+
+def drive_with_rates(road: Road, profile: SpeedProfile, t: np.ndarray) -> tuple[Readings, tuple]:
+    """The same, always at as many times."""
+    results = road_readings_and_rates(*of_equal_shapes(road, profile), np.resize(t, TIMES.size))
+    return jax.tree.map(lambda x: np.asarray(x)[: t.size], results)
+
+
+def drive(road: Road, profile: SpeedProfile, t: np.ndarray) -> Readings:
+    return drive_with_rates(road, profile, t)[0]
+
+
+def at_edges(series: object) -> object:
+    return jax.tree.map(lambda x: np.asarray(x)[: EDGES.size], series)
 
 
 @cache
-def euler_and_speed_with_rates(name: str) -> tuple:
-    """(euler, speed) at the edges of the panels, and their derivatives."""
-    return jax.tree.map(np.asarray, euler_and_speed_with_their_rates(*of_equal_shapes(ROADS[name], STOPS), EDGES))
+def drive_on(name: str) -> tuple[Readings, tuple]:
+    return drive_with_rates(ROADS[name], STOPS, TIMES)
+
+
+@cache
+def edges_and_nodes(name: str) -> tuple[Readings, Readings]:
+    """Readings at the edges of the panels, and at the nodes between."""
+    if name in ROADS:
+        readings, _ = drive_on(name)
+    else:
+        readings = flight_readings(FLIGHT, TIMES) if name == "flight" else windsurfer_readings(SURFER, TIMES)
+    return at_edges(readings), jax.tree.map(lambda x: np.asarray(x)[EDGES.size :], readings)
+
+
+def yaw_pitch_roll(C_nb: np.ndarray) -> np.ndarray:
+    """Angles by scipy, in its signs: nose-up pitch is negative."""
+    return Rotation.from_matrix(C_nb).as_euler("ZYX").T
 
 
 def integral(values: np.ndarray) -> np.ndarray:
@@ -205,7 +219,7 @@ def test_chalko_equation_4(name: str) -> None:
 def test_patent_equations(name: str) -> None:
     """The patent's equations in forward-left-up axes, each with every term."""
     r = edges_and_nodes(name)[0]
-    (euler, speed), (euler_rate, acceleration) = euler_and_speed_with_rates(name)
+    (euler, speed), (euler_rate, acceleration) = at_edges(drive_on(name)[1])
     (roll, pitch, _), (roll_rate, pitch_rate, yaw_rate) = np.asarray(euler).T, np.asarray(euler_rate).T
     assert np.ptp(roll) > 0.05 or name in ("slope", "helix")
     assert np.ptp(pitch) > 0.05 or name == "helix"
@@ -232,7 +246,7 @@ def test_shirai_equation_1_up_to_its_remainder(name: str) -> None:
     w_y^2 + w_z^2 = (cos(pitch) yaw')^2 + pitch'^2, so that h - A_U = (v w_y)^2 / 2g for a_y = v w_z.
     """
     r = edges_and_nodes(name)[0]
-    (euler, v), (euler_rate, a_x) = euler_and_speed_with_rates(name)
+    (euler, v), (euler_rate, a_x) = at_edges(drive_on(name)[1])
     _, pitch_rate, yaw_rate = np.asarray(euler_rate).T
     excess = (np.sum(r.f_b**2, -1) - a_x**2 - G**2) / (2 * G) - r.acceleration[:, 2]
     curvature = (v * pitch_rate) ** 2 / (2 * G)
@@ -286,9 +300,8 @@ def test_circle(radius: float, grade: float) -> None:
     yaw = yaw_rate * SEVEN
     expected = np.stack([radius * np.sin(yaw), radius * (1 - np.cos(yaw)), grade * v * SEVEN], -1)
     np.testing.assert_allclose(r.position, expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(
-        np.unwrap(matrix_to_euler(r.C_nb)[:, 2]), np.unwrap(np.angle(np.exp(1j * yaw))), atol=1e-13
-    )
+    got = yaw_pitch_roll(r.C_nb)[0]
+    np.testing.assert_allclose(np.unwrap(got), np.unwrap(np.angle(np.exp(1j * yaw))), atol=1e-13)
 
 
 def test_coordinated_turn() -> None:
@@ -298,14 +311,14 @@ def test_coordinated_turn() -> None:
     r = jax.tree.map(lambda x: np.asarray(x)[:7], flight_readings(flight, np.resize(SEVEN, TIMES.size)))
     bank = np.arctan(v * v / (radius * G))
     np.testing.assert_allclose(r.f_b, np.tile([0, 0, G / np.cos(bank)], (7, 1)), rtol=0, atol=1e-12)
-    np.testing.assert_allclose(matrix_to_euler(r.C_nb)[:, 0], -bank, rtol=1e-13)
+    np.testing.assert_allclose(yaw_pitch_roll(r.C_nb)[2], -bank, rtol=1e-13)
     through_air = np.einsum("tij,ti->tj", r.C_nb, r.velocity - WIND)
     np.testing.assert_allclose(through_air, np.tile([v, 0, 0], (7, 1)), rtol=0, atol=1e-12)
 
 
 def test_flight_has_no_lateral_specific_force_on_any_path() -> None:
     r = edges_and_nodes("flight")[0]
-    assert np.ptp(matrix_to_euler(r.C_nb)[:, 0]) > 0.7
+    assert np.ptp(yaw_pitch_roll(r.C_nb)[2]) > 0.7
     assert_small(r.f_b[:, 1], G)
     assert r.f_b[:, 2].min() > 0
 
@@ -323,9 +336,9 @@ def test_standstill(name: str) -> None:
 
 def test_windsurfer_leans_to_windward_and_falls() -> None:
     calm = replace(SURFER, displacement=0 * SURFER.displacement, sway=0 * SURFER.sway, head=0 * SURFER.head)
-    helmet = split(windsurfer_readings(calm, TIMES))[0].position
+    helmet = at_edges(windsurfer_readings(calm, TIMES)).position
     board = drive(SURFER.road, SURFER.profile, EDGES)
-    yaw = matrix_to_euler(board.C_nb)[:, 2]
+    yaw = yaw_pitch_roll(board.C_nb)[0]
     assert np.max(yaw) > 0.95 and np.min(yaw) < -0.95
     upright = (EDGES < 18.99) | (EDGES > 25)
     # the wind is from the left on the reach to the left, and the other way round
@@ -340,47 +353,29 @@ def test_windsurfer_leans_to_windward_and_falls() -> None:
 
 def test_windsurfer_need_not_fall() -> None:
     surfer = gybing_windsurfer(9.0, 1.0, 60.0, 39.5, 39.5)
-    r, _ = split(windsurfer_readings(surfer, TIMES))
-    never, _ = split(windsurfer_readings(replace(surfer, fall=np.zeros(3)), TIMES))
+    r = at_edges(windsurfer_readings(surfer, TIMES))
+    never = at_edges(windsurfer_readings(replace(surfer, fall=np.zeros(3)), TIMES))
     np.testing.assert_array_equal(r.position[EDGES <= 39.5], never.position[EDGES <= 39.5])
     board = drive(surfer.road, surfer.profile, EDGES)
     assert np.min(board.speed[(EDGES > 3.9) & (EDGES < 35.6)]) > 4
 
 
-def test_batch_of_roads_is_a_loop() -> None:
-    rng = np.random.default_rng(1)
-    phases, gains = rng.uniform(0, 6, (2, 5, 4)), rng.uniform(0, 0.01, (2, 5))
-    t = np.linspace(3.0, 30.0, 7)
-
-    def other(phase: jax.Array, roll_gain: jax.Array) -> Road:
-        return replace(HILLS, phase=phase, roll_gain=roll_gain)
-
-    batch = jax.vmap(jax.vmap(lambda *leaves: road_readings(other(*leaves), STOPS, t)))(phases, gains)
-    assert batch.f_b.shape == (2, 5, 7, 3)
-    for i in range(2):
-        for j in range(5):
-            one = drive(other(phases[i, j], gains[i, j]), STOPS, t)
-            for field in fields(Readings):
-                got, expected = getattr(batch, field.name)[i, j], getattr(one, field.name)
-                np.testing.assert_allclose(got, expected, rtol=1e-11, atol=1e-11)
+DIFFERENTIATED = {
+    "hills": ((HILLS, STOPS), lambda motion, t: road_readings(*motion, t)),
+    "flight": (FLIGHT, flight_poses),
+    "windsurfer": (SURFER, windsurfer_poses),
+}
+STEP, OTHERS = 1e-4, 10
 
 
-def test_jit_changes_nothing() -> None:
-    for got, expected in zip(jax.jit(road_pose)(HILLS, STOPS, 7.0), road_pose(HILLS, STOPS, 7.0), strict=True):
-        np.testing.assert_allclose(got, expected, rtol=1e-12, atol=1e-12)
+@cache
+def neighbours(name: str) -> tuple:
+    """A batch of motions near one: ((weighted sum of all that a motion yields, (motion and times, yield)), gradient).
 
-
-@pytest.mark.parametrize(
-    ("motion", "outcome"),
-    [
-        ((HILLS, STOPS), lambda motion, t: road_readings(*motion, t)),
-        (FLIGHT, flight_poses),
-        (SURFER, windsurfer_poses),
-    ],
-    ids=["hills", "flight", "windsurfer"],
-)
-def test_gradients_are_finite_and_agree_with_differences(motion: object, outcome: Callable) -> None:
-    """Of a weighted sum of all it yields, in time and every parameter; some of the times lie on ends of ramps."""
+    First the motion itself, then those one and two steps to either side of each parameter and time, last others at
+    random. Some of the times lie on ends of ramps.
+    """
+    motion, outcome = DIFFERENTIATED[name]
     t = np.array([0.0, 1.0, 2.3, 8.0, 15.0, 19.3, 23.0])
     start, unravel = ravel_pytree((motion, t))
     start = np.asarray(start)
@@ -388,25 +383,42 @@ def test_gradients_are_finite_and_agree_with_differences(motion: object, outcome
     rng = np.random.default_rng(2)
     weights = [rng.standard_normal(leaf.shape) for leaf in jax.tree.leaves(jax.eval_shape(outcome, motion, t))]
 
-    @jax.jit
-    @jax.vmap
-    @jax.value_and_grad
-    def weighted(relative: jax.Array) -> jax.Array:
-        leaves = jax.tree.leaves(outcome(*unravel(start + scale * relative)))
-        return jnp.stack([jnp.vdot(w, leaf) for w, leaf in zip(weights, leaves, strict=True)]).sum()
+    def weighted(relative: jax.Array) -> tuple:
+        motion_and_t = unravel(start + scale * relative)
+        outcomes = outcome(*motion_and_t)
+        sums = [jnp.vdot(w, leaf) for w, leaf in zip(weights, jax.tree.leaves(outcomes), strict=True)]
+        return jnp.stack(sums).sum(), (motion_and_t, outcomes)
 
-    step, unit = 1e-4, np.eye(start.size)
-    values, gradients = weighted(step * np.concatenate([0 * unit[:1], unit, -unit, 2 * unit, -2 * unit]))
-    gradient = np.asarray(gradients[0])
-    assert np.isfinite(gradient).all()
+    unit = STEP * np.eye(start.size)
+    others = rng.uniform(-0.2, 0.2, (OTHERS, start.size))
+    points = np.concatenate([0 * unit[:1], unit, -unit, 2 * unit, -2 * unit, others])
+    return jax.tree.map(np.asarray, jit_once(jax.vmap(jax.value_and_grad(weighted, has_aux=True)))(points))
+
+
+@pytest.mark.parametrize("name", DIFFERENTIATED)
+def test_gradients_are_finite_and_agree_with_differences(name: str) -> None:
+    """In time and every parameter."""
+    (values, _), gradients = neighbours(name)
+    gradient = gradients[0]
+    assert np.isfinite(gradients).all()
     assert np.mean(gradient != 0) > 0.6
-    plus, minus, plus2, minus2 = np.asarray(values[1:]).reshape(4, -1)
-    differences = (8 * (plus - minus) - (plus2 - minus2)) / (12 * step)
+    plus, minus, plus2, minus2 = values[1:-OTHERS].reshape(4, -1)
+    differences = (8 * (plus - minus) - (plus2 - minus2)) / (12 * STEP)
     np.testing.assert_allclose(gradient, differences, rtol=2e-6, atol=1e-7 * np.max(np.abs(gradient)))
 
 
+def test_batch_of_roads_is_a_loop() -> None:
+    (_, ((motions_on_roads, t), batch)), _ = neighbours("hills")
+    assert batch.f_b.shape == (len(t), 7, 3)
+    for i in range(len(t) - OTHERS, len(t)):
+        one = drive(*jax.tree.map(itemgetter(i), motions_on_roads), t[i])
+        for field in fields(Readings):
+            got, expected = getattr(batch, field.name)[i], getattr(one, field.name)
+            np.testing.assert_allclose(got, expected, rtol=1e-11, atol=1e-11)
+
+
 def test_single_precision() -> None:
-    single = road_readings(*jax.tree.map(np.float32, (HILLS, STOPS, EDGES)))
+    single = jit_once(lambda *drive: road_readings(*drive))(*jax.tree.map(np.float32, (HILLS, STOPS, EDGES)))
     exact = edges_and_nodes("hills")[0]
     for field in fields(Readings):
         got, expected = getattr(single, field.name), getattr(exact, field.name)
