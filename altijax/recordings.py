@@ -120,8 +120,8 @@ class Recording:
     def _repr_html_(self) -> str:
         notes = "".join(f"<li>{html.escape(note)}</li>" for note in self.notes)
         return (
-            f"<p><b>{html.escape(self.name)}</b>: {html.escape(self.description)}<br>axes {html.escape(self.axes)}, "
-            f"<code>{html.escape(self.source)}</code></p>{_formatted(self).to_html(border=0)}<ul>{notes}</ul>"
+            f"<p><b>{html.escape(self.name)}</b>: {html.escape(self.description)}<br>axes {html.escape(self.axes)}"
+            f"</p>{_formatted(self).to_html(border=0)}<ul>{notes}</ul>"
         )
 
 

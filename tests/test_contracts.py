@@ -232,9 +232,15 @@ def test_derivatives_are_finite_and_agree(function: FunctionType) -> None:
     primals = [made[name] for name in names]
     rng = np.random.default_rng(0)
     tangents = [jnp.asarray(rng.standard_normal(p.shape), p.dtype) for p in primals]
-    values, forward = jax.jvp(of_arrays, primals, tangents)
-    cotangents = [jnp.asarray(rng.standard_normal(v.shape), v.dtype) for v in values]
-    backward = jax.vjp(of_arrays, *primals)[1](cotangents)
+    shapes = jax.eval_shape(of_arrays, *primals)
+    cotangents = [jnp.asarray(rng.standard_normal(v.shape), v.dtype) for v in shapes]
+
+    @jax.jit
+    def both_modes(primals: list, tangents: list, cotangents: list) -> tuple:
+        values, forward = jax.jvp(of_arrays, primals, tangents)
+        return values, forward, jax.vjp(of_arrays, *primals)[1](cotangents)
+
+    values, forward, backward = both_modes(primals, tangents, cotangents)
     for leaf in [*values, *forward, *backward]:
         assert np.isfinite(leaf).all()
     one = sum(float(jnp.vdot(c, f)) for c, f in zip(cotangents, forward, strict=True))

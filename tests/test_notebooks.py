@@ -17,7 +17,8 @@ NOTEBOOKS = [pytest.param(path, id=path.stem) for path in sorted(FOLDER.glob("*.
 def test_runs_without_errors_or_complaints(path: Path) -> None:
     for cell in execute(path).cells:
         for output in cell.get("outputs", []):
-            assert output.output_type != "error" and output.get("name") != "stderr", output
+            downloading = output.get("text", "").startswith("Downloading file")
+            assert output.output_type != "error" and (output.get("name") != "stderr" or downloading), output
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS)

@@ -411,7 +411,8 @@ def test_command_line_writes_the_same_rows_as_csv_and_json(
 ) -> None:
     assert command_line.main(["shirai2000", "--output", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert max(map(len, printed.splitlines())) <= 120
+    # the last line names the folder, as long as that may be
+    assert max(map(len, printed.splitlines()[:-1])) <= 120
     assert "232 numbers: 164 match, 65 explained, 3 differ" in printed
     assert printed.isascii()
     for name, rows in (("comparison", report.comparisons), ("findings", report.findings)):
