@@ -24,3 +24,9 @@ def arctan2(y: jax.Array, x: jax.Array) -> jax.Array:
     # Its derivative divides by x^2 + y^2, which underflows long before x and y do.
     defined = x * x + y * y > jnp.finfo(jnp.result_type(x, y)).tiny
     return jnp.where(defined, jnp.arctan2(jnp.where(defined, y, 0), jnp.where(defined, x, 1)), 0)
+
+
+def arcsin(x: jax.Array) -> jax.Array:
+    """Angle of a sine; at and beyond -1 and 1 the nearest of -pi/2 and pi/2, with zero gradient."""
+    inside = jnp.abs(x) < 1
+    return jnp.where(inside, jnp.arcsin(jnp.where(inside, x, 0)), jnp.sign(x) * (jnp.pi / 2))

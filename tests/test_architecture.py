@@ -19,7 +19,7 @@ LEVELS = [
     ["earth", "roads"],
     ["motions", "sensors", "wheels", "doppler"],
     ["instruments"],
-    ["altitude"],
+    ["altitude", "speed"],
     ["metrics"],
     ["stream_checks"],
     ["tidy_folder", "log_formats"],

@@ -30,6 +30,7 @@ CORE = [
     "wheels",
     "doppler",
     "altitude",
+    "speed",
     "metrics",
 ]
 SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2}
