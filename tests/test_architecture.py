@@ -16,10 +16,14 @@ ROOT = PACKAGE.parent
 LEVELS = [
     ["constants", "_shapes", "_safe"],
     ["rotations", "signals", "least_squares"],
+    ["_epoch_cost"],
     ["earth", "roads"],
     ["motions", "sensors", "wheels", "doppler"],
-    ["instruments"],
+    ["instruments", "strapdown"],
+    ["attitude"],
     ["altitude", "speed"],
+    ["speed_model"],
+    ["speed_filter"],
     ["metrics"],
     ["stream_checks"],
     ["tidy_folder", "log_formats"],
@@ -28,6 +32,9 @@ LEVELS = [
     ["datasets", "drives"],
     ["elevation_model"],
     ["estimates"],
+    ["speed_steps"],
+    ["speed_estimates"],
+    ["speed_outages"],
     ["plots"],
 ]
 LEVEL = {name: number for number, names in enumerate(LEVELS) for name in names}
