@@ -29,13 +29,15 @@ CORE = [
     "sensors",
     "wheels",
     "doppler",
+    "strapdown",
     "altitude",
     "speed",
+    "speed_filter",
     "metrics",
 ]
 SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2}
 # Sizes of records that each constructor chooses for itself.
-FREE = {"terms", "legs", "waves"}
+FREE = {"terms", "legs", "waves", "states"}
 BATCHES = [(), (5,), (2, 5)]
 
 FUNCTIONS = [pytest.param(f, id=f"{name}.{f.__name__}") for name in CORE for f in public_functions(name)]
