@@ -14,12 +14,13 @@ ROOT = PACKAGE.parent
 
 # Each level may import from the levels before it; modules of one level know nothing of each other.
 LEVELS = [
-    ["constants", "_shapes", "_safe"],
-    ["rotations", "signals", "least_squares"],
+    ["constants", "_shapes", "_safe", "_fast_trigonometry"],
+    ["rotations", "signals", "least_squares", "serial_correlation", "standstill", "wahba"],
     ["_epoch_cost"],
+    ["_epoch_steps"],
     ["earth", "roads"],
     ["motions", "sensors", "wheels", "doppler"],
-    ["instruments", "strapdown"],
+    ["instruments", "static_calibration", "strapdown"],
     ["attitude"],
     ["altitude", "speed"],
     ["speed_model"],

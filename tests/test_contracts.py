@@ -23,6 +23,9 @@ CORE = [
     "rotations",
     "signals",
     "least_squares",
+    "serial_correlation",
+    "standstill",
+    "wahba",
     "earth",
     "roads",
     "motions",
@@ -35,7 +38,7 @@ CORE = [
     "speed_filter",
     "metrics",
 ]
-SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2}
+SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2, "pairs": 5}
 # Sizes of records that each constructor chooses for itself.
 FREE = {"terms", "legs", "waves", "states"}
 BATCHES = [(), (5,), (2, 5)]
@@ -195,10 +198,13 @@ def test_shapes(function: FunctionType, batch: tuple[int, ...]) -> None:
         if entry.shape is not None:
             assert value.shape == (batch if entry.batched else ()) + trailing(entry), entry.name
         else:
-            record = getattr(importlib.import_module(function.__module__), entry.slot)
+            # "Record of (..., time)" is a record whose batched fields have more leading axes
+            named, _, more = entry.slot.partition(" of ")
+            leading = batch + trailing(Entry(entry.name, more, False)) if more else batch
+            record = getattr(importlib.import_module(function.__module__), named)
             for attribute in section(record, "Attributes"):
                 if attribute.shape is not None and not FREE & set(attribute.shape):
-                    expected = (batch if attribute.batched else ()) + trailing(attribute)
+                    expected = (leading if attribute.batched else ()) + trailing(attribute)
                     assert getattr(value, attribute.name).shape == expected, attribute.name
 
 
