@@ -294,7 +294,8 @@ def _quaternion(A: Matrix) -> Vector:
         (z, xz, yz, size - a - b + c),
     )
     # Each row is the quaternion times 4 of its elements: that of the largest element cannot vanish.
-    best, square = rows[0], rows[0][0]
+    best: Vector = rows[0]
+    square = rows[0][0]
     for i in (1, 2, 3):
         larger = rows[i][i] > square
         best = tuple(jnp.where(larger, new, old) for new, old in zip(rows[i], best, strict=True))

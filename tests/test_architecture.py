@@ -15,12 +15,12 @@ ROOT = PACKAGE.parent
 # Each level may import from the levels before it; modules of one level know nothing of each other.
 LEVELS = [
     ["constants", "_shapes", "_safe", "_fast_trigonometry"],
-    ["rotations", "signals", "least_squares", "serial_correlation", "standstill", "wahba"],
+    ["rotations", "signals", "least_squares", "identifiability", "serial_correlation", "standstill", "wahba"],
     ["_epoch_cost"],
     ["_epoch_steps"],
-    ["earth", "roads"],
+    ["earth", "roads", "smoothing"],
     ["motions", "sensors", "wheels", "doppler"],
-    ["instruments", "static_calibration", "strapdown"],
+    ["allan", "instruments", "static_calibration", "strapdown"],
     ["attitude"],
     ["altitude", "speed"],
     ["speed_model"],

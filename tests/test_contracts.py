@@ -26,6 +26,7 @@ CORE = [
     "serial_correlation",
     "standstill",
     "wahba",
+    "smoothing",
     "earth",
     "roads",
     "motions",
@@ -38,7 +39,7 @@ CORE = [
     "speed_filter",
     "metrics",
 ]
-SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2, "pairs": 5}
+SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2, "pairs": 5, "epochs": 6}
 # Sizes of records that each constructor chooses for itself.
 FREE = {"terms", "legs", "waves", "states"}
 BATCHES = [(), (5,), (2, 5)]
@@ -63,6 +64,7 @@ POSITIVE = {
     "ramp": 3.0,
     "reach_length": 60.0,
     "fall_start": 8.0,
+    "gate": 5.0,
 }
 # Records that have no nominal form are made by a constructor of theirs.
 ROAD = ([0.3, 0.2], [90.0, 60.0], [0.0, 1.0], [0.1, 0.05], [80.0, 50.0], [0.0, 1.0], 3.0)
@@ -95,7 +97,7 @@ def example(entry: Entry, batch: tuple[int, ...], dtype: type, seed: int) -> obj
     if name.startswith("C"):
         rotations = Rotation.random(int(np.prod(shape[:-2], initial=1)), rng=rng).as_matrix()
         values = rotations.reshape(shape)
-    elif name in ("t", "t_knots", "t_samples", "t_pulses"):
+    elif name in ("t", "t_knots", "t_samples", "t_pulses", "t_gnss"):
         values = np.broadcast_to(np.arange(shape[-1]) * 0.1, shape) if shape else np.array(0.7)
     elif name == "edges":
         values = np.linspace(0.03, 0.61, shape[-1])
