@@ -2,7 +2,7 @@
 
 With roll, pitch and yaw changed by (x_1, x_2, x_3) from where they are believed to be, an epoch costs
 
-    |C_nb^T f_n - f_b|^2 + sum (ratio_i wrap(x_i))^2
+    |C_nb^T f_n - f_b|^2 + sum (ratio_i x_i)^2
 
 in units of the measurement's variance, `ratio` being the standard deviation of the measurement over that of the angle.
 A rotation keeps length, so all that varies with the attitude in the first term is -2 f_b . C_nb^T f_n, and derivatives
@@ -18,6 +18,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from altijax._fast_trigonometry import cosine, sine
 from altijax.rotations import wrap_angle
 
 Vector = tuple[jax.Array, jax.Array, jax.Array]
@@ -57,20 +58,20 @@ def turned(f_b: Vector, f_n: Vector, sines: Vector, cosines: Vector) -> Turned:
 def turned_by(f_b: Vector, f_n: Vector, euler0: Vector, change: Vector) -> Turned:
     """`turned` for the initial angles and their change."""
     angles = [e + x for e, x in zip(euler0, change, strict=True)]
-    return turned(f_b, f_n, _each(jnp.sin, angles), _each(jnp.cos, angles))
+    return turned(f_b, f_n, each(sine, angles), each(cosine, angles))
 
 
 def residuals(forces: Turned, change: Vector, ratio: Vector) -> list[jax.Array]:
     """What the cost is the sum of squares of; the misfits stand in the axes between pitch and roll."""
     misfits = [b - n for b, n in zip(forces.b, forces.n, strict=True)]
-    return misfits + [r * wrap_angle(x) for r, x in zip(ratio, change, strict=True)]
+    return misfits + [r * x for r, x in zip(ratio, change, strict=True)]
 
 
 def gradient(forces: Turned, change: Vector, ratio: Vector) -> Vector:
     """Half the gradient of the cost by roll, pitch and yaw."""
     a, b, n, k, _ = forces
     slope = b[1] * n[2] - b[2] * n[1], a[0] * k[2] - a[2] * k[0], a[0] * k[1] - a[1] * k[0]
-    x, y, z = (s + r * r * wrap_angle(x) for s, r, x in zip(slope, ratio, change, strict=True))
+    x, y, z = (s + r * r * x for s, r, x in zip(slope, ratio, change, strict=True))
     return x, y, z
 
 
@@ -122,26 +123,25 @@ def gauss_newton(forces: Turned, ratio: Vector) -> Symmetric:
 
 def solve(matrix: Symmetric, v: Vector) -> Vector:
     """Solution x of ``matrix x = v`` for a positive definite matrix."""
-    # L D L^T: accurate for any condition, which cofactors are not
-    p, q, r, d = _factors(matrix)
+    # Elimination in sequence: accurate for any condition, which cofactors are not
+    inverse, p, q, d, e, g = _eliminated(matrix)
     y = v[1] - p * v[0]
-    z = (v[2] - q * v[0] - r * y) / d[2]
-    y = y / d[1] - r * z
-    return v[0] / d[0] - p * y - q * z, y, z
+    z = ((v[2] - q * v[0]) * d - e * y) / g
+    y = (y - e * z) / d
+    return (v[0] - matrix.xy * y - matrix.xz * z) * inverse, y, z
 
 
 def is_positive_definite(matrix: Symmetric) -> jax.Array:
     """Whether `solve` may be asked."""
-    pivots = _factors(matrix)[3]
-    return (pivots[0] > 0) & (pivots[1] > 0) & (pivots[2] > 0)  # False for NaN
+    *_, d, _, g = _eliminated(matrix)
+    return (matrix.xx > 0) & (d > 0) & (g > 0)  # False for NaN
 
 
-def _factors(m: Symmetric) -> tuple[jax.Array, jax.Array, jax.Array, Vector]:
-    p, q = m.xy / m.xx, m.xz / m.xx
-    d = m.yy - p * m.xy
-    e = m.yz - p * m.xz
-    r = e / d
-    return p, q, r, (m.xx, d, m.zz - q * m.xz - r * e)
+def _eliminated(m: Symmetric) -> tuple[jax.Array, ...]:
+    inverse = 1 / m.xx
+    p, q = m.xy * inverse, m.xz * inverse
+    d, e = m.yy - p * m.xy, m.yz - p * m.xz
+    return inverse, p, q, d, e, (m.zz - q * m.xz) * d - e * e
 
 
 def _with_prior(m: Symmetric, ratio: Vector) -> Symmetric:
@@ -156,8 +156,9 @@ def derivative_of_minimum(change: Vector, arguments: tuple[Vector, ...], tangent
     """
 
     def gradient_of(f_b: Vector, f_n: Vector, euler0: Vector, ratio: Vector) -> Vector:
-        return gradient(turned_by(f_b, f_n, euler0, change), change, ratio)
+        return gradient(turned_by(f_b, f_n, euler0, change), within, ratio)
 
+    within = each(wrap_angle, change)
     pull = jax.jvp(gradient_of, arguments, tangents)[1]
     f_b, f_n, euler0, ratio = arguments
     x, y, z = newton_step(turned_by(f_b, f_n, euler0, change), ratio, pull)
@@ -166,11 +167,22 @@ def derivative_of_minimum(change: Vector, arguments: tuple[Vector, ...], tangent
 
 def newton_step(forces: Turned, ratio: Vector, v: Vector) -> Vector:
     """Solution x of ``hessian x = v``; with `gauss_newton` where no minimum is near and `hessian` shows it."""
-    exact, substitute = hessian(forces, ratio), gauss_newton(forces, ratio)
-    proper = is_positive_definite(exact)
-    return solve(Symmetric(*(jnp.where(proper, e, s) for e, s in zip(exact, substitute, strict=True))), v)
+    exact = hessian(forces, ratio)
+    return solve(choose(is_positive_definite(exact), exact, gauss_newton(forces, ratio)), v)
 
 
-def _each(function: Callable[[jax.Array], jax.Array], components: Iterable[jax.Array]) -> Vector:
+def choose(condition: jax.Array, one: Symmetric, other: Symmetric) -> Symmetric:
+    """`one` where the condition holds, else the `other`."""
+    return Symmetric(*(jnp.where(condition, a, b) for a, b in zip(one, other, strict=True)))
+
+
+def sum_of_squares(numbers: Iterable[jax.Array]) -> jax.Array:
+    """Sum of the squares of some arrays."""
+    first, *others = (v * v for v in numbers)
+    return sum(others, first)
+
+
+def each(function: Callable[[jax.Array], jax.Array], components: Iterable[jax.Array]) -> Vector:
+    """The function's value at each component."""
     x, y, z = map(function, components)
     return x, y, z
