@@ -6,7 +6,7 @@ estimate never looks at the recording's reference: `calibrate` may, up to `until
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 
 from altijax import metrics
+from altijax.calibrations import Calibration, prior_constants
 from altijax.drives import Drive, drive_arrays, imu_of, reference_heights, start_of
 from altijax.elevation_model import (
     ELEVATION_METHODS,
@@ -22,54 +23,14 @@ from altijax.elevation_model import (
     PARAMETERS,
     UNCERTAINTY,
     elevation,
-    elevation_and_sensitivity,
-    elevation_std,
     uncertain_constants,
 )
+from altijax.elevation_posterior import Posterior, elevation_posterior
 from altijax.least_squares import Fit, levenberg_marquardt
 from altijax.recordings import Recording
 
 # A direction of the parameters that the data see a hundred times less well than another.
 _BLIND = 1e-2
-
-
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class Calibration:
-    """Constants fitted to a reference, how well they are known, and whether they help where they were not fitted.
-
-    Attributes
-    ----------
-    method : str
-        Method whose misfit was minimised.
-    values, std : Series
-        Value and standard deviation by parameter name.
-    correlation : DataFrame
-        Correlation between the parameters.
-    absorbed : DataFrame
-        By how much each value moves if one of the constants left at nominal (columns) is off by one unit.
-    held_out : DataFrame
-        One row a recording: last time used, and the misfit (RMS, its offset removed) with nominal and with fitted
-        constants, on what was fitted and on what was held out; NaN where nothing was.
-    """
-
-    method: str
-    values: pd.Series
-    std: pd.Series
-    correlation: pd.DataFrame
-    absorbed: pd.DataFrame
-    held_out: pd.DataFrame
-
-    def _table(self) -> pd.DataFrame:
-        return pd.DataFrame(
-            {"value": self.values, "std": self.std, "unit": PARAMETERS["unit"].reindex(self.values.index)}
-        )
-
-    def __repr__(self) -> str:
-        return f"Calibration of {self.method!r}\n{self._table()}\n{self.held_out.T}"
-
-    def _repr_html_(self) -> str:
-        title = f"<p>Calibration of <b>{self.method}</b>; RMS misfit where fitted and where held out</p>"
-        return title + self._table().to_html(border=0) + self.held_out.round(3).to_html(border=0)
 
 
 def estimate_elevation(
@@ -78,6 +39,7 @@ def estimate_elevation(
     method: str = "slope",
     calibration: Calibration | None = None,
     initial_vertical_speed: float | None = None,
+    known_heights: pd.DataFrame | Iterable[tuple[float, float]] | None = None,
 ) -> pd.DataFrame:
     """Elevation along a drive from accelerometer and speed sensor.
 
@@ -85,43 +47,48 @@ def estimate_elevation(
     ----------
     recording : Recording
         With an IMU and wheel speeds, or else GNSS velocities, whose ground speed then serves; GNSS heights never do.
-    method : {"slope", "shirai"}
+    method : {"slope", "shirai", "fused"}
         "shirai" integrates Eq. (1) of [shirai2000]_ twice; it takes the rate of turn from the wheels where left and
         right are recorded and the track width is known, else from the gyro. "slope" integrates the road's slope once.
+        "fused" takes both by their errors, with what roads are like, and finds the constants of sensors, mounting and
+        car (how it pitches under load) by itself, as far as the drive shows them.
     calibration : Calibration, optional
         Constants from `calibrate`; nominal ones otherwise.
     initial_vertical_speed : float, optional
-        In m/s, for "shirai"; it goes before the calibration's. By default the calibration's, else the slope's of the
-        first second, which is zero at standstill.
+        In m/s, for "shirai" and "fused"; it goes before the calibration's. By default the calibration's, else the
+        slope's of the first second, which is zero at standstill.
+    known_heights : DataFrame or pairs (t, height), optional
+        Surveyed heights in m above anything, on the recording's time axis: of start and end, of points on the way, of
+        one place passed twice, or of the first seconds. A DataFrame has t as its index and a column height. The
+        constants and the profile are what they are likely to be given these heights.
 
     Returns
     -------
     estimate : DataFrame
         Indexed as ``recording.imu``: elevation (m, zero at the first sample), elevation_std (m), way (m), horizontal
         (m), vertical_speed (m/s), and valid, False where the IMU or the speed has a gap or had not begun. Without a
-        calibration of the constants the standard deviation is that of an uncalibrated consumer's instrument.
+        calibration of the constants the standard deviation is that of an uncalibrated consumer's instrument; where
+        heights are known or the method is "fused", the level of the noise is the likeliest for this drive.
 
     Raises
     ------
     ValueError
-        If the method is unknown or the recording lacks a stream that it needs.
+        If the method is unknown, the recording lacks a stream that it needs, or known heights are not numbers at times
+        of the recording.
     """
     _require_method(method)
+    known = None if known_heights is None else _known_heights(known_heights, recording)
     with jax.enable_x64(True):
-        drive, grid = drive_arrays(recording, turns=method == "shirai")
-        values = {} if calibration is None else {str(name): jnp.asarray(v) for name, v in calibration.values.items()}
-        if initial_vertical_speed is not None:
-            values["initial_vertical_speed"] = jnp.asarray(float(initial_vertical_speed))
-        names, covariance = _spread(values, calibration, drive, method)
-        found, jacobian = elevation_and_sensitivity(values, drive, tuple(names), method)
-        found["elevation_std"] = elevation_std(found, jacobian, covariance, drive.t, method)
+        drive, grid = drive_arrays(recording, turns=method != "slope")
+        fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
+        found = elevation_posterior(
+            drive, prior_constants(drive, method, calibration, fixed), method, known, fixed
+        ).series
         imu_index = imu_of(recording).index
         t = imu_index.to_numpy(float)
         columns = ("elevation", "elevation_std", "way", "horizontal", "vertical_speed")
-        estimate = pd.DataFrame(
-            {name: np.interp(t, grid, np.asarray(found[name])) for name in columns}, index=imu_index
-        )
-        estimate["valid"] = np.asarray(found["valid"])[np.clip(np.searchsorted(grid, t), 0, grid.size - 1)]
+        estimate = pd.DataFrame({name: np.interp(t, grid, found[name]) for name in columns}, index=imu_index)
+        estimate["valid"] = found["valid"][np.clip(np.searchsorted(grid, t), 0, grid.size - 1)]
     return estimate
 
 
@@ -141,8 +108,9 @@ def calibrate(
         in each.
     parameters : str or several
         Names of `PARAMETERS`; the others keep their nominal values.
-    method : {"slope", "shirai"}
-        Method to calibrate.
+    method : {"slope", "shirai", "fused"}
+        Method to calibrate. With "fused" the constants begin at their priors, and all other constants and the noise of
+        the drive are found beside them.
     until : float, optional
         Last time, on the recordings' time axis, whose reference may be used; all of it by default. Afterwards the
         reference only measures what the calibration is worth there (``held_out``).
@@ -176,7 +144,7 @@ def calibrate(
     if "initial_vertical_speed" in names and len(recordings) > 1:
         raise ValueError("initial_vertical_speed belongs to one recording: calibrate it on one alone")
     with jax.enable_x64(True):
-        drives = [drive_arrays(recording, turns=method == "shirai")[0] for recording in recordings]
+        drives = [drive_arrays(recording, turns=method != "slope")[0] for recording in recordings]
         references = [reference_heights(recording) for recording in recordings]
         end = np.inf if until is None else until
         fitted = [t[t <= end - start_of(r)].size for r, (t, _) in zip(recordings, references, strict=True)]
@@ -184,6 +152,8 @@ def calibrate(
             raise ValueError(
                 f"{len(names)} parameter(s) need more reference than {sum(fitted)} height(s) up to until={until}"
             )
+        if method == "fused":
+            return _calibrate_fused(recordings, drives, references, fitted, names)
         targets = [(t[:n], heights[:n]) for (t, heights), n in zip(references, fitted, strict=True)]
         others = [name for name in uncertain_constants(drives[0], method) if name not in names]
         if len(drives) > 1:
@@ -194,22 +164,11 @@ def calibrate(
         _warn_of_what_cannot_be_told_apart(names, jacobian)
         covariance = np.asarray(fit.covariance) * _residual_variance(np.asarray(residuals), fitted)
         constants = _named(fit.x, tuple(names))
-        held_out = []
-        for recording, drive, target, n in zip(recordings, drives, references, fitted, strict=True):
-            nominal, best = (
-                np.asarray(_error({}, drive, target, method)),
-                np.asarray(_error(constants, drive, target, method)),
-            )
-            held_out.append(
-                {
-                    "recording": recording.name,
-                    "until": target[0][n - 1] + start_of(recording),
-                    "fitted_nominal": np.std(nominal[:n]),
-                    "fitted": np.std(best[:n]),
-                    "held_out_nominal": np.std(nominal[n:]) if n < nominal.size else np.nan,
-                    "held_out": np.std(best[n:]) if n < best.size else np.nan,
-                }
-            )
+        errors = [
+            [np.asarray(_error(of, drive, target, method)) for of in ({}, constants)]
+            for drive, target in zip(drives, references, strict=True)
+        ]
+        held_out = _held_out(recordings, references, fitted, errors)
     deviation = np.sqrt(np.diag(covariance))
     absorbed = -np.linalg.lstsq(jacobian, np.asarray(full_jacobian)[:, len(names) :])[0]
     units = PARAMETERS["uncertainty"]
@@ -219,7 +178,7 @@ def calibrate(
         std=units[names].rename("std") * deviation,
         correlation=pd.DataFrame(covariance / np.outer(deviation, deviation), index=names, columns=names),
         absorbed=pd.DataFrame(absorbed, names, others).mul(units[names], axis=0).div(units[others], axis=1),
-        held_out=pd.DataFrame.from_records(held_out, index="recording"),
+        held_out=held_out,
     )
 
 
@@ -280,27 +239,88 @@ def _require_method(method: str) -> None:
         raise ValueError(f"method must be one of {', '.join(ELEVATION_METHODS)}, got {method!r}")
 
 
-def _spread(
-    values: dict[str, jax.Array], calibration: Calibration | None, drive: Drive, method: str
-) -> tuple[list[str], np.ndarray]:
-    """Names and covariance of the constants that are not known exactly.
+def _known_heights(
+    known: pd.DataFrame | Iterable[tuple[float, float]], recording: Recording
+) -> tuple[np.ndarray, np.ndarray]:
+    """Times from the first IMU sample, and heights, in order."""
+    if isinstance(known, pd.DataFrame):
+        if "height" not in known:
+            raise ValueError(
+                f"known_heights must have a column height, and times as its index; got {', '.join(map(str, known))}"
+            )
+        pairs = np.column_stack([known.index.to_numpy(float), known["height"].to_numpy(float)])
+    else:
+        pairs = np.asarray(list(known), float)
+    if pairs.ndim != 2 or pairs.shape[1] != 2 or not pairs.size or not np.isfinite(pairs).all():
+        raise ValueError(f"known_heights must be finite pairs (t, height), at least one; got shape {pairs.shape}")
+    first, last = start_of(recording), float(imu_of(recording).index[-1])
+    outside = (pairs[:, 0] < first) | (pairs[:, 0] > last)
+    if outside.any():
+        raise ValueError(
+            f"known_heights has a time of {pairs[outside][0, 0]:g} s, outside the IMU's {first:g} to {last:g} s"
+        )
+    pairs = pairs[np.argsort(pairs[:, 0], kind="stable")]
+    return pairs[:, 0] - first, pairs[:, 1]
 
-    A calibrated constant has taken up what the others, left at nominal, did where it was fitted: it is off by its own
-    error and, against each of them, by what it absorbed.
-    """
-    names = [] if calibration is None else [str(name) for name in calibration.values.index if name in values]
-    others = {name: std for name, std in uncertain_constants(drive, method).items() if name not in values}
-    covariance = np.diag(np.square([*np.zeros(len(names)), *others.values()]))
-    if calibration is not None:
-        std = calibration.std[names].to_numpy()
-        own = calibration.correlation.loc[names, names].to_numpy() * np.outer(std, std)
-        absorbed = calibration.absorbed if calibration.method == method else pd.DataFrame()
-        gain = absorbed.reindex(index=names, columns=list(others)).fillna(0.0).to_numpy()
-        through = np.vstack([gain, np.eye(len(others))])
-        rest = np.diag(np.square(list(others.values())))
-        covariance = through @ rest @ through.T
-        covariance[: len(names), : len(names)] += own
-    return names + list(others), covariance
+
+def _calibrate_fused(
+    recordings: list[Recording],
+    drives: list[Drive],
+    references: list[tuple[np.ndarray, np.ndarray]],
+    fitted: list[int],
+    names: list[str],
+) -> Calibration:
+    """One drive after the other, each beginning with what the ones before have left."""
+    idle = [name for name in names if name not in uncertain_constants(drives[0], "fused")]
+    if idle:
+        raise ValueError(f"{', '.join(idle)}: not a constant of method 'fused' on these recordings; leave it out")
+
+    def after(drive: Drive, calibration: Calibration | None, known: tuple | None) -> Posterior:
+        return elevation_posterior(drive, prior_constants(drive, "fused", calibration), "fused", known)
+
+    calibration = None
+    for drive, (t, heights), n in zip(drives, references, fitted, strict=True):
+        constants = after(drive, calibration, (t[:n], heights[:n])).constants
+        pick = [constants.names.index(name) for name in names]
+        covariance = constants.covariance[np.ix_(pick, pick)]
+        std = np.sqrt(np.diag(covariance))
+        calibration = Calibration(
+            method="fused",
+            values=pd.Series(constants.mean[pick], names, name="value"),
+            std=pd.Series(std, names, name="std"),
+            correlation=pd.DataFrame(covariance / np.outer(std, std), names, names),
+            absorbed=pd.DataFrame(index=pd.Index(names)),
+            held_out=pd.DataFrame(),
+        )
+    assert calibration is not None  # there is at least one drive
+    errors = [
+        [np.interp(t, drive.t, after(drive, of, None).series["elevation"]) - heights for of in (None, calibration)]
+        for drive, (t, heights) in zip(drives, references, strict=True)
+    ]
+    return replace(calibration, held_out=_held_out(recordings, references, fitted, errors))
+
+
+def _held_out(
+    recordings: list[Recording],
+    references: list[tuple[np.ndarray, np.ndarray]],
+    fitted: list[int],
+    errors: list[list[np.ndarray]],
+) -> pd.DataFrame:
+    """Misfit on what was fitted and on the rest, for errors with nominal and with fitted constants."""
+    rows = []
+    for recording, (t, _), n, (nominal, best) in zip(recordings, references, fitted, errors, strict=True):
+        rest = n < nominal.size
+        rows.append(
+            {
+                "recording": recording.name,
+                "until": t[n - 1] + start_of(recording),
+                "fitted_nominal": np.std(nominal[:n]),
+                "fitted": np.std(best[:n]),
+                "held_out_nominal": np.std(nominal[n:]) if rest else np.nan,
+                "held_out": np.std(best[n:]) if rest else np.nan,
+            }
+        )
+    return pd.DataFrame.from_records(rows, index="recording")
 
 
 def _named(x: jax.Array, names: tuple[str, ...]) -> dict[str, jax.Array]:

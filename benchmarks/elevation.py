@@ -1,0 +1,56 @@
+"""How often the true elevation lies within the stated error bars, over simulated drives.
+
+    python -m benchmarks.elevation [drives]
+
+Every third drive has no known height, the heights of its ends, or those of its first third.
+"""
+
+import sys
+
+import numpy as np
+
+from altijax.estimates import estimate_elevation
+from tests.simulated_drives import DURATION, simulated_drive
+
+
+def known_heights(reference: np.ndarray, case: int) -> np.ndarray | None:
+    """Pairs (t, height) of a case."""
+    if case == 0:
+        return None
+    return reference[[0, -1]] if case == 1 else reference[reference[:, 0] <= DURATION / 3]
+
+
+def errors_and_bars(seed: int, case: int, method: str = "fused") -> tuple[np.ndarray, np.ndarray]:
+    """Error and standard deviation wherever the height is not known, after the start of the drive."""
+    recording = simulated_drive(seed)
+    reference = recording.reference.reset_index().to_numpy()
+    known = known_heights(reference, case)
+    estimate = estimate_elevation(recording, method=method, known_heights=known)
+    truth = np.interp(estimate.index, reference[:, 0], reference[:, 1]) - reference[0, 1]
+    moved = estimate["way"] > 5.0
+    moved &= estimate.index > (DURATION / 3 if case == 2 else 0)
+    moved &= estimate["way"] < estimate["way"].iloc[-1] - 5.0
+    return (estimate["elevation"] - truth)[moved].to_numpy(), estimate["elevation_std"][moved].to_numpy()
+
+
+def main(drives: int) -> None:
+    """Print the coverage and the errors of each case and of all."""
+    ratios: list[list[np.ndarray]] = [[], [], []]
+    squares: list[list[float]] = [[], [], []]
+    for seed in range(drives):
+        error, std = errors_and_bars(seed, seed % 3)
+        ratios[seed % 3].append(np.abs(error) / std)
+        squares[seed % 3].append(float(np.mean(error**2)))
+    for name, of_case, of_squares in zip(("no heights", "ends", "first third"), ratios, squares, strict=True):
+        every = np.concatenate(of_case)
+        print(
+            f"{name:12s} {len(of_case):4d} drives: within one {np.mean(every <= 1):.3f}, two "
+            f"{np.mean(every <= 2):.3f}; "
+            f"median RMS {np.sqrt(np.median(of_squares)):.2f} m"
+        )
+    every = np.concatenate([ratio for of_case in ratios for ratio in of_case])
+    print(f"{'all':12s} {drives:4d} drives: within one {np.mean(every <= 1):.3f}, two {np.mean(every <= 2):.3f}")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 210)

@@ -1,0 +1,92 @@
+"""Drives over made-up roads, by a car that squats, with a consumer's sensors whose constants nobody knows."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax.constants import STANDARD_GRAVITY
+from altijax.elevation_model import NOMINAL, PARAMETERS
+from altijax.elevation_smoother import ElevationNoise
+from altijax.motions import Readings, ideal_readings, road_pose
+from altijax.recordings import Recording
+from altijax.roads import SpeedProfile, winding_road
+from altijax.rotations import euler_to_matrix
+
+jax.config.update("jax_enable_x64", True)
+
+DURATION, RATE = 100.0, 20.0
+SPREAD = {
+    name: float(PARAMETERS.loc[name, "uncertainty"])
+    for name in (
+        *("accelerometer_bias_x", "accelerometer_bias_y", "accelerometer_bias_z"),
+        *("accelerometer_scale", "accelerometer_scale_x", "mounting_pitch", "mounting_yaw"),
+        *("lever_arm", "weight_transfer", "yaw_rate_bias", "wheel_scale"),
+    )
+}
+
+
+@jax.jit
+def _motion(slopes: jax.Array, lengths: jax.Array, phases: jax.Array, bend: jax.Array, speeds: jax.Array) -> Readings:
+    road = winding_road(bend[:1], bend[1:2], bend[2:], slopes, lengths, phases, jnp.array(0.0))
+    profile = SpeedProfile(
+        start=jnp.array([3.0, 45.0]),
+        stop=jnp.array([34.0, 88.0]),
+        ramp=jnp.array([7.0, 8.0]),
+        speed=speeds,
+        modulation=jnp.zeros(0),
+        wavenumber=jnp.zeros(0),
+        phase=jnp.zeros(0),
+    )
+    t = jnp.arange(0, DURATION, 1 / RATE)
+    return ideal_readings(partial(road_pose, road, profile), t, STANDARD_GRAVITY)
+
+
+def simulated_drive(seed: int) -> Recording:
+    """One drive of 100 s with a stop in it; IMU and wheels 20 Hz, heights 5 Hz."""
+    rng = np.random.default_rng(seed)
+    hills = 4
+    truth = _motion(
+        jnp.asarray(rng.normal(0, 0.05 * np.sqrt(2 / hills), hills)),
+        jnp.asarray(rng.uniform(200, 1500, hills)),
+        jnp.asarray(rng.uniform(0, 2 * np.pi, hills)),
+        jnp.asarray([rng.uniform(0.1, 0.6), rng.uniform(150, 500), rng.uniform(0, 2 * np.pi)]),
+        jnp.asarray(rng.uniform(8, 18, 2)),
+    )
+    constants = {name: NOMINAL[name] + std * rng.normal() for name, std in SPREAD.items()}
+    f = np.array(truth.f_b)
+    speed, yaw_rate = np.asarray(truth.speed), np.asarray(truth.w_b[:, 2])
+    # The car, whose errors are those that the estimator presumes, at a level of its own.
+    noise, level = ElevationNoise(), np.exp(0.5 * rng.normal())
+    f[:, 0] *= 1 + constants["weight_transfer"]
+    f[:, 0] += level * noise.trim * _lasting(rng, f.shape[0], noise.trim_time)
+    way = np.maximum(speed / RATE, 0.05)
+    f[:, 0] += level * noise.slope * STANDARD_GRAVITY * rng.normal(size=way.size) / np.sqrt(way)
+    f[:, 2] += noise.rectified * _lasting(rng, f.shape[0], noise.rectified_time)
+    f[:, 0] -= constants["lever_arm"] * yaw_rate**2
+    mounting = np.asarray(euler_to_matrix(jnp.array([0.0, constants["mounting_pitch"], constants["mounting_yaw"]])))
+    f = f @ mounting
+    for i, axis in enumerate("xyz"):
+        scale = constants["accelerometer_scale"] * (constants["accelerometer_scale_x"] if axis == "x" else 1.0)
+        f[:, i] = (f[:, i] + constants[f"accelerometer_bias_{axis}"]) * scale
+    f += 0.03 * rng.normal(size=f.shape)
+    index = pd.Index(np.asarray(truth.t), name="t")
+    imu = pd.DataFrame(f, index=index, columns=["ax", "ay", "az"])
+    imu[["gx", "gy"]] = 0.0
+    imu["gz"] = yaw_rate + constants["yaw_rate_bias"] + 0.002 * rng.normal(size=yaw_rate.size)
+    turning = speed / constants["wheel_scale"]
+    wheel = pd.DataFrame({"speed": turning + 0.02 * (turning > 0.1) * rng.normal(size=speed.size)}, index=index)
+    reference = pd.DataFrame({"alt": 100 + np.asarray(truth.position[:, 2])}, index=index)
+    return Recording(name=f"simulated {seed}", imu=imu, wheel=wheel, reference=reference[::4])
+
+
+def _lasting(rng: np.random.Generator, count: int, time: float) -> np.ndarray:
+    """Stationary Gauss-Markov series of unit variance."""
+    keep = np.exp(-1 / (RATE * time))
+    series = np.empty(count)
+    series[0] = rng.normal()
+    for i, shock in enumerate(np.sqrt(1 - keep**2) * rng.normal(size=count - 1)):
+        series[i + 1] = keep * series[i] + shock
+    return series
