@@ -33,24 +33,24 @@ CHUNK, RESCUED_AT_ONCE = 4096, 64
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, kw_only=True)
 class AttitudeFit:
-    """Attitude that fits one epoch, and what the epoch knows of it.
+    """Attitude that fits an epoch, and what the epoch knows of it.
 
     Attributes
     ----------
-    euler : (3,) rad
+    euler : (..., 3) rad
         Roll in (-pi, pi], pitch in [-pi/2, pi/2] and yaw in (-pi, pi].
-    C_nb : (3, 3)
+    C_nb : (..., 3, 3)
         Maps body vectors to navigation vectors.
-    covariance : (3, 3) rad^2
+    covariance : (..., 3, 3) rad^2
         Covariance of roll, pitch and yaw as the fit found them, before they were brought into their ranges.
-    data_share : (3,)
+    data_share : (..., 3)
         Part of each angle that comes from the data, between 0 and 1; the rest is the initial value. One less the ratio
         of the variance to that of the prior; the sum is the number of angles that the epoch determines.
-    rank : ()
+    rank : (...)
         Number of directions in which the data outweigh the prior: 2 as a rule, 0 near free fall.
-    cost : ()
+    cost : (...)
         Sum of the squared residuals, in units of their variances.
-    status : ()
+    status : (...)
         0 converged, 1 steps used up, 2 data not finite: the result is the prior, 3 converged at the second attempt
         (`fit_attitudes` alone).
     """
@@ -137,7 +137,7 @@ def fit_attitudes(
 
     Returns
     -------
-    fits : AttitudeFit (epochs)
+    fits : AttitudeFit of (epochs,)
         What `fit_attitude` returns, with a leading axis `epochs`; `status` is 3 for epochs that converged after the
         second attempt.
 

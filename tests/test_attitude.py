@@ -10,7 +10,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from altijax.attitude import RESCUED, course_attitude, fit_attitude, fit_attitudes, hold_attitudes
-from altijax.least_squares import CONVERGED, NOT_FINITE, levenberg_marquardt
+from altijax.least_squares import CONVERGED, NOT_FINITE, STEPS_USED_UP, levenberg_marquardt
 from altijax.rotations import euler_to_matrix, matrix_to_euler, wrap_angle
 
 PRIOR, NOISE = np.radians(10.0), 0.1
@@ -32,6 +32,11 @@ def fit_each(f_b, f_n, euler0, prior_std=PRIOR, measurement_std=NOISE):
         return fit_attitude(f_b, f_n, euler0, prior_std=prior_std, measurement_std=measurement_std)
 
     return jax.vmap(fit)(f_b, f_n, euler0)
+
+
+@jax.jit
+def fit_all(f_b, f_n, euler0, prior_std=PRIOR, measurement_std=NOISE):
+    return fit_attitudes(f_b, f_n, euler0, prior_std=prior_std, measurement_std=measurement_std)
 
 
 def by_minpack(f_b, f_n, euler0):
@@ -90,7 +95,7 @@ def test_free_fall_and_missing_data_leave_all_to_the_prior() -> None:
     zero, missing = np.zeros(3), np.full(3, np.nan)
     f_b, f_n = np.stack([zero, UP, missing]), np.stack([1e-9 * UP, missing, UP])
     euler0 = np.tile([0.3, -0.2, 1.0], (3, 1))
-    for fits in (fit_each(f_b, f_n, euler0), fit_attitudes(f_b, f_n, euler0, prior_std=PRIOR, measurement_std=NOISE)):
+    for fits in (fit_each(f_b, f_n, euler0), fit_all(f_b, f_n, euler0)):
         np.testing.assert_allclose(fits.euler, euler0, atol=1e-9)
         np.testing.assert_allclose(fits.covariance, PRIOR**2 * np.tile(np.eye(3), (3, 1, 1)), atol=1e-9)
         np.testing.assert_array_equal(fits.rank, 0)
@@ -111,21 +116,24 @@ def test_angles_come_back_in_their_ranges() -> None:
 def test_all_at_once_is_each_by_itself(prior: float) -> None:
     """Also where many epochs need the second attempt, and where the last chunk reaches back."""
     f_b, f_n, euler0 = epochs(5000, seed=3, prior=prior)
-    each = fit_each(f_b, f_n, euler0, prior)
-    fits = jax.jit(fit_attitudes)(f_b, f_n, euler0, prior_std=prior, measurement_std=NOISE)
-    assert np.isin(fits.status, [CONVERGED, RESCUED]).all()
-    assert (fits.status == RESCUED).any()
+    each, fits = fit_each(f_b, f_n, euler0, prior), fit_all(f_b, f_n, euler0, prior)
     same = np.isclose(fits.cost, each.cost, rtol=1e-10)
-    # beyond a prior of some 0.3 rad an epoch may have several minima
-    assert same.mean() >= (1 if prior == PRIOR else 0.99)
+    if prior == PRIOR:
+        assert np.isin(fits.status, [CONVERGED, RESCUED]).all()
+        assert same.all()
+    else:
+        assert np.mean(fits.status == RESCUED) > 0.1
+        # Of several minima the two ways may take different ones, and at the edge of half a turn neither may arrive.
+        assert same.mean() > 0.995
+        assert np.mean(fits.status == STEPS_USED_UP) < 0.002
     np.testing.assert_allclose(wrap_angle(fits.euler - each.euler)[same], 0, atol=1e-6)
     np.testing.assert_allclose(fits.covariance[same], each.covariance[same], atol=1e-6)
 
 
 def test_single_precision_is_near_double() -> None:
     f_b, f_n, euler0 = epochs(500, seed=4)
-    double = fit_attitudes(f_b, f_n, euler0, prior_std=PRIOR, measurement_std=NOISE)
-    single = fit_attitudes(*(np.float32(x) for x in (f_b, f_n, euler0)), prior_std=PRIOR, measurement_std=NOISE)
+    double = fit_all(f_b, f_n, euler0)
+    single = fit_all(*(np.float32(x) for x in (f_b, f_n, euler0)))
     assert single.euler.dtype == np.float32
     assert np.isin(single.status, [CONVERGED, RESCUED]).all()
     np.testing.assert_allclose(wrap_angle(single.euler - double.euler), 0, atol=2e-4)
@@ -139,8 +147,8 @@ def test_derivatives_are_those_of_the_minimum() -> None:
     rng = np.random.default_rng(6)
     tangents = tuple(jnp.asarray(0.1 * rng.standard_normal(x.shape)) for x in arguments)
 
-    def at_once(f_b, f_n, euler0, prior_std, measurement_std):
-        fits = fit_attitudes(f_b, f_n, euler0, prior_std=prior_std, measurement_std=measurement_std)
+    def at_once(*arguments):
+        fits = fit_all(*arguments)
         return fits.euler, fits.covariance, fits.cost
 
     def each(*arguments):

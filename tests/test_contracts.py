@@ -27,6 +27,8 @@ CORE = [
     "standstill",
     "wahba",
     "smoothing",
+    "delays",
+    "rotation_splines",
     "earth",
     "roads",
     "motions",
@@ -34,6 +36,7 @@ CORE = [
     "wheels",
     "doppler",
     "strapdown",
+    "attitude",
     "altitude",
     "speed",
     "speed_filter",
@@ -202,7 +205,8 @@ def test_shapes(function: FunctionType, batch: tuple[int, ...]) -> None:
         else:
             # "Record of (..., time)" is a record whose batched fields have more leading axes
             named, _, more = entry.slot.partition(" of ")
-            leading = batch + trailing(Entry(entry.name, more, False)) if more else batch
+            batched = any(parameter.batched for parameter in section(function, "Parameters"))
+            leading = (batch if batched else ()) + (trailing(Entry(entry.name, more, False)) if more else ())
             record = getattr(importlib.import_module(function.__module__), named)
             for attribute in section(record, "Attributes"):
                 if attribute.shape is not None and not FREE & set(attribute.shape):
