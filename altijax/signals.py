@@ -102,10 +102,7 @@ def low_pass(t: ArrayLike, values: ArrayLike, cutoff: ArrayLike, axis: int = -1)
     t, x = _series(t, values, axis, at_least=2)
     cutoff = require_shape("cutoff", cutoff, ())
     n = t.size
-    # Less the line through its ends, the reflected series has the period 2 (n - 1) exactly.
-    line = x[..., :1] + (x[..., -1:] - x[..., :1]) * jnp.linspace(0, 1, n, dtype=x.dtype)
-    rest = x - line
-    odd = jnp.concatenate([rest, -rest[..., -2:0:-1]], -1)
+    line, odd = _odd_reflection(x)
     phase = jnp.pi / 2 * jnp.linspace(0, 1, n, dtype=x.dtype)
     relative = jnp.minimum(cutoff * (t[-1] - t[0]) / (n - 1), 0.5)
     passed = (jnp.cos(phase) * jnp.tan(jnp.pi * relative)) ** 4
@@ -217,6 +214,86 @@ def fourier_interval_means(t: ArrayLike, values: ArrayLike, edges: ArrayLike) ->
     """
     edges = require_shape("edges", edges, (None,))
     return _fourier_means(t, values, 0.5 * (edges[1:] + edges[:-1]), jnp.diff(edges))
+
+
+def interval_means(t: ArrayLike, values: ArrayLike, edges: ArrayLike) -> jax.Array:
+    """Exact means, between consecutive edges, of the straight lines through the samples.
+
+    For jittered and gapped samples, and without any trouble at the ends: the plain counterpart of
+    `fourier_interval_means`, which needs uniform samples. On what is well below half the sampling rate both agree.
+    Beyond the first and the last sample these are held.
+
+    Parameters
+    ----------
+    t : (time,) s
+        Sample times, increasing; spacing may vary.
+    values : (..., time)
+        Series.
+    edges : (edges,) s
+        Ends of the intervals, increasing, each one's end being the next one's beginning.
+
+    Returns
+    -------
+    means : (..., edges - 1)
+        Means of the same unit; of an interval of no length the value there.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit or there are fewer than two samples.
+    """
+    t, x = _series(t, values, -1, at_least=2)
+    edges = require_shape("edges", edges, (None,))
+    areas = 0.5 * (x[..., 1:] + x[..., :-1]) * jnp.diff(t)
+    integral = jnp.concatenate([jnp.zeros_like(x[..., :1]), jnp.cumsum(areas, -1)], -1)
+    k = jnp.clip(jnp.searchsorted(t, edges, side="right") - 1, 0, t.size - 2)
+    into = edges - t[k]
+    inside = jnp.clip(into, 0, t[k + 1] - t[k])
+    at_edge = x[..., k] + inside / (t[k + 1] - t[k]) * (x[..., k + 1] - x[..., k])
+    up_to = integral[..., k] + 0.5 * inside * (x[..., k] + at_edge) + (into - inside) * at_edge
+    width = jnp.diff(edges)
+    some = width > 0
+    return jnp.where(some, jnp.diff(up_to, axis=-1) / jnp.where(some, width, 1), at_edge[..., 1:])
+
+
+def periodic_extension(t: ArrayLike, values: ArrayLike) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Series continued so that its ends meet, for the Fourier functions, and the line that was taken off before.
+
+    Less the line through its first and last samples, the series is followed by its odd reflection about the end: value
+    and slope then go on across both ends, while a series that is repeated as it is jumps there and rings. Add the mean
+    of the line, its value at mid-interval, to the means of what is returned.
+
+    Parameters
+    ----------
+    t : (time,) s
+        Sample times, uniformly spaced. At least two.
+    values : (..., time)
+        Series.
+
+    Returns
+    -------
+    t_continued : (2 * time - 2,) s
+        Times of the continued series, going on at the same spacing.
+    continued : (..., 2 * time - 2)
+        Periodic series, equal to `values` less the line at `t`.
+    line : (..., time)
+        The line through the first and the last sample.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit or there are fewer than two samples.
+    """
+    t, x = _series(t, values, -1, at_least=2)
+    line, odd = _odd_reflection(x)
+    return t[0] + (t[-1] - t[0]) / (t.size - 1) * jnp.arange(odd.shape[-1]).astype(t.dtype), odd, line
+
+
+def _odd_reflection(x: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Line through the ends, and the rest with its odd reflection: its period is 2 (n - 1) exactly."""
+    line = x[..., :1] + (x[..., -1:] - x[..., :1]) * jnp.linspace(0, 1, x.shape[-1], dtype=x.dtype)
+    rest = x - line
+    return line, jnp.concatenate([rest, -rest[..., -2:0:-1]], -1)
 
 
 def _fourier_means(t: ArrayLike, values: ArrayLike, middles: jax.Array, widths: jax.Array) -> jax.Array:

@@ -146,6 +146,49 @@ def test_fourier_means_of_an_hour_fit_in_memory() -> None:
     assert lowered.compile().memory_analysis().temp_size_in_bytes < 400e6
 
 
+def test_interval_means_are_integrals_of_straight_lines() -> None:
+    edges = np.sort(np.r_[JITTERED[0], RNG.uniform(JITTERED[0], JITTERED[-1], 30), JITTERED[50], JITTERED[51]])
+    merged = np.sort(np.r_[JITTERED, edges])
+    area = integrate.cumulative_trapezoid(np.interp(merged, JITTERED, WALK[0]), merged, initial=0)
+    expected = np.diff(np.interp(edges, merged, area)) / np.diff(edges)
+    np.testing.assert_allclose(s.interval_means(JITTERED, WALK[0], edges), expected, rtol=1e-10, atol=1e-10)
+    np.testing.assert_allclose(s.interval_means(JITTERED, WALK, [-9.0, -8.0, -8.0]), WALK[:, :1] + np.zeros(2))
+
+
+def test_extended_ends_do_not_ring() -> None:
+    """A ramp and a wave: repeated as it is it jumps at the ends. Means of the wave alone are the truth."""
+    t = np.arange(501) * 0.02
+    edges = np.arange(0.0, 10.01, 1.0)
+    values = 3.0 + 0.4 * t + np.sin(1.7 * t)
+    truth = 3.0 + 0.2 * (edges[1:] + edges[:-1]) - np.diff(np.cos(1.7 * edges)) / 1.7
+    t_long, long, line = s.periodic_extension(t, values)
+    assert t_long.size == 1000
+    np.testing.assert_allclose(long[:501] + line, values, atol=1e-13)
+    mended = s.fourier_interval_means(t_long, long, edges) + np.interp((edges[1:] + edges[:-1]) / 2, t, line)
+    np.testing.assert_allclose(mended, truth, atol=2e-4)
+    between = t[:-1] + 0.01
+    wave = 3.0 + 0.4 * between + np.sin(1.7 * between)
+    assert np.abs(s.fourier_reconstruction(t, values, between) - wave).max() > 0.1
+    rest = s.fourier_reconstruction(t_long, long, between) + np.interp(between, t, line)
+    np.testing.assert_allclose(rest, wave, atol=1e-3)
+    np.testing.assert_allclose(s.interval_means(t, values, edges), truth, atol=2e-4)
+
+
+def test_plain_and_fourier_means_differ_little_on_what_is_band_limited() -> None:
+    """By a hundredth of a degree of 9.8 m/s^2 over a second at 50 Hz; Fourier's are exact."""
+    n = 1000
+    t = np.arange(n) * 0.02
+    k = np.arange(1, 60)
+    phase = RNG.uniform(0, 2 * np.pi, k.size)
+    w = 2 * np.pi * k / (0.02 * n)
+    values = np.sum(np.cos(w * t[:, None] + phase), -1) / np.sqrt(k.size / 2)
+    edges = np.arange(0.0, 19.5, 1.0) + 0.007
+    area = np.sum(np.sin(w * edges[:, None] + phase) / w, -1) / np.sqrt(k.size / 2)
+    np.testing.assert_allclose(s.fourier_interval_means(t, values, edges), np.diff(area), atol=1e-12)
+    difference = np.abs(s.interval_means(t, values, edges) - np.diff(area)).max()
+    assert 1e-9 < difference < np.radians(0.01) * 9.8
+
+
 @pytest.mark.parametrize(
     ("call", "message"),
     [
