@@ -1,0 +1,214 @@
+"""Kalman filter and smoother of a linear state-space model with any matrices, differentiable and free of inverses.
+
+    x_0 ~ N(x0, P0),   x_{k+1} = F_k x_k + c_k + noise of covariance Q_k,   z_k = H_k x_k + noise of variance R_k
+
+The smoother is the one of Bierman (modified Bryson-Frazier): it inverts no covariance of states, so states may be known
+exactly or not change at all. A measurement that is missing is a row of zeros in z and H with any variance in R.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+from altijax._shapes import require_shape
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Filtered:
+    """States before each measurement, and how the measurement met them.
+
+    Attributes
+    ----------
+    x : (time, states)
+        Mean of the state before the measurement.
+    P : (time, states, states)
+        Its covariance.
+    gain : (time, states, rows)
+        Kalman gain.
+    innovation : (time, rows)
+        Measurement less its prediction.
+    precision : (time, rows, rows)
+        Inverse of the innovation's covariance.
+    log_likelihood : (time,)
+        Logarithm of the probability density of each measurement given those before it.
+    """
+
+    x: jax.Array
+    P: jax.Array
+    gain: jax.Array
+    innovation: jax.Array
+    precision: jax.Array
+    log_likelihood: jax.Array
+
+
+def filter_states(
+    F: ArrayLike, c: ArrayLike, Q: ArrayLike, z: ArrayLike, H: ArrayLike, R: ArrayLike, x0: ArrayLike, P0: ArrayLike
+) -> Filtered:
+    """Run the filter forward.
+
+    Parameters
+    ----------
+    F : (time - 1, states, states)
+        Transition from each instant to the next.
+    c : (time - 1, states)
+        Constant part of the transition.
+    Q : (time - 1, states, states)
+        Covariance of its noise.
+    z : (time, rows)
+        Measurements.
+    H : (time, rows, states)
+        Their derivative by the state.
+    R : (time, rows)
+        Variances of their independent errors, positive.
+    x0 : (states,)
+        Mean of the state before the first measurement.
+    P0 : (states, states)
+        Its covariance.
+
+    Returns
+    -------
+    filtered : Filtered
+        Predicted states, innovations and likelihood.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+    """
+    x0 = require_shape("x0", x0, (None,))
+    states = x0.size
+    F = require_shape("F", F, (None, states, states))
+    intervals = F.shape[0]
+    c, Q = require_shape("c", c, (intervals, states)), require_shape("Q", Q, (intervals, states, states))
+    z = require_shape("z", z, (intervals + 1, None))
+    rows = z.shape[1]
+    H = require_shape("H", H, (intervals + 1, rows, states))
+    R = require_shape("R", R, (intervals + 1, rows))
+    P0 = require_shape("P0", P0, (states, states))
+
+    def update(x: jax.Array, P: jax.Array, z: jax.Array, H: jax.Array, R: jax.Array) -> tuple:
+        cross = P @ H.T
+        root = jnp.linalg.cholesky(H @ cross + jnp.diag(R))
+        whitener = jax.scipy.linalg.solve_triangular(root, jnp.eye(rows, dtype=x.dtype), lower=True)
+        precision = whitener.T @ whitener
+        gain = cross @ precision
+        innovation = z - H @ x
+        white = whitener @ innovation
+        log_likelihood = -0.5 * white @ white - jnp.sum(jnp.log(jnp.diagonal(root)))
+        P_after = P - gain @ cross.T
+        return x + gain @ innovation, 0.5 * (P_after + P_after.T), (gain, innovation, precision, log_likelihood)
+
+    def step(state: tuple, inputs: tuple) -> tuple:
+        x, P = state
+        z, H, R, F, c, Q = inputs
+        x_after, P_after, met = update(x, P, z, H, R)
+        return (F @ x_after + c, F @ P_after @ F.T + Q), (x, P, *met)
+
+    last, before = jax.lax.scan(step, (x0, P0), (z[:-1], H[:-1], R[:-1], F, c, Q))
+    final: tuple = (*last, *update(*last, z[-1], H[-1], R[-1])[2])
+    seen = [jnp.concatenate([a, b[None]]) for a, b in zip(before, final, strict=True)]
+    return Filtered(x=seen[0], P=seen[1], gain=seen[2], innovation=seen[3], precision=seen[4], log_likelihood=seen[5])
+
+
+def smooth_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> tuple[jax.Array, jax.Array]:
+    """Run the smoother backward over what `filter_states` found.
+
+    Parameters
+    ----------
+    F : (time - 1, states, states)
+        Transition from each instant to the next.
+    H : (time, rows, states)
+        Derivative of the measurements by the state.
+    filtered : Filtered
+        What the filter found with the same.
+
+    Returns
+    -------
+    x : (time, states)
+        Mean of the state given all measurements.
+    P : (time, states, states)
+        Its covariance.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+    """
+    states = filtered.x.shape[-1]
+    F = require_shape("F", F, (None, states, states))
+    H = require_shape("H", H, (F.shape[0] + 1, filtered.innovation.shape[-1], states))
+    slope, information, _, _ = _adjoint(F, H, filtered)
+    x = filtered.x + jnp.einsum("tij,tj->ti", filtered.P, slope)
+    return x, filtered.P - filtered.P @ information @ filtered.P
+
+
+def _adjoint(F: jax.Array, H: jax.Array, filtered: Filtered) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """First and negated second derivative of the log-likelihood by the predicted states, then by the updated ones."""
+    identity = jnp.eye(filtered.x.shape[-1], dtype=filtered.x.dtype)
+
+    def step(later: tuple, inputs: tuple) -> tuple:
+        slope, information = later
+        F, H, gain, innovation, precision = inputs
+        slope_after, information_after = F.T @ slope, F.T @ information @ F
+        kept = identity - gain @ H
+        slope = kept.T @ slope_after + H.T @ (precision @ innovation)
+        information = kept.T @ information_after @ kept + H.T @ precision @ H
+        information = 0.5 * (information + information.T)
+        return (slope, information), (slope, information, slope_after, information_after)
+
+    start = jnp.zeros_like(filtered.x[0]), jnp.zeros_like(filtered.P[0])
+    after = jnp.concatenate([F, identity[None]])
+    seen = (after, H, filtered.gain, filtered.innovation, filtered.precision)
+    return jax.lax.scan(step, start, seen, reverse=True)[1]
+
+
+def likelihood_gradients(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> dict[str, jax.Array]:
+    """Derivatives of the sum of log-likelihoods by the arguments of `filter_states` but H.
+
+    Exact, and as cheap as the smoother: its adjoint variables are the derivatives by states and covariances. So the
+    gradient by whatever a model depends on is the vector-Jacobian product of the model alone, no scan within.
+
+    Parameters
+    ----------
+    F : (time - 1, states, states)
+        Transition from each instant to the next.
+    H : (time, rows, states)
+        Derivative of the measurements by the state.
+    filtered : Filtered
+        What the filter found with the same.
+
+    Returns
+    -------
+    gradients : dict of str to array
+        By name of the argument, of its shape; by Q and P0 the symmetric one.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+    """
+    states, rows = filtered.x.shape[-1], filtered.innovation.shape[-1]
+    F = require_shape("F", F, (None, states, states))
+    H = require_shape("H", H, (F.shape[0] + 1, rows, states))
+    slope, information, slope_after, information_after = _adjoint(F, H, filtered)
+    by_P = 0.5 * (slope[:, :, None] * slope[:, None, :] - information)
+    gain = filtered.gain
+    P_after = filtered.P - gain @ H @ filtered.P
+    x_after = filtered.x + jnp.einsum("tij,tj->ti", gain, filtered.innovation)
+    by_F = slope[1:, :, None] * x_after[:-1, None, :] + 2 * by_P[1:] @ F @ P_after[:-1]
+    # Residual over variance, and its second moment.
+    u = jnp.einsum("tij,tj->ti", filtered.precision, filtered.innovation) - jnp.einsum("tij,ti->tj", gain, slope_after)
+    turned = jnp.swapaxes(gain, -1, -2) @ information_after @ gain
+    by_R = 0.5 * (u * u - jnp.diagonal(filtered.precision + turned, axis1=-2, axis2=-1))
+    return {
+        "F": by_F,
+        "c": slope[1:],
+        "Q": by_P[1:],
+        "z": -u,
+        "R": by_R,
+        "x0": slope[0],
+        "P0": by_P[0],
+    }
