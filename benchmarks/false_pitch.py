@@ -31,7 +31,7 @@ from altijax.motion_estimates import estimate_motion
 from altijax.strapdown import integrate_attitude
 from altijax.wahba import fit_windows
 
-RATE, BEFORE, AFTER = 100, 60.0, 30.0
+RATE, BEFORE, AFTER = 100, 60.0, 35.0
 LASTING = (5.0, 10.0)
 SPEED, ACCELERATION, GRAVITY = 10.0, 3.0, 9.80665
 
@@ -55,7 +55,7 @@ def level_drive(lasting: float, seed: int = 0) -> Drive:
 
     What calibration left: 0.03 m/s^2 and 0.1 deg/s, one standard deviation, on each axis.
     """
-    t = np.arange(round((BEFORE + lasting + AFTER) * RATE) + 1) / RATE - BEFORE
+    t = np.arange(round((BEFORE + AFTER) * RATE) + 1) / RATE - BEFORE
     rise = 0.2
     a = ACCELERATION * np.clip(np.minimum(t, lasting + rise - t) / rise, 0, 1)
     speed = SPEED + np.concatenate([[0], np.cumsum((a[1:] + a[:-1]) / 2 / RATE)])

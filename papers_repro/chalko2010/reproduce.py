@@ -75,25 +75,25 @@ def _report(output: Path) -> Report:
 
 def _bounds(simulated: Tables) -> list[Comparison]:
     """Set by what Doppler noise alone does: 0.05 m/s between velocities a second apart are 0.4 deg."""
-    bounds = []
-    for name, table in simulated.items():
-        bounds += [
-            compare_bound(
-                table="attitude with a gyro", row=name, column=column, unit="deg", bound=bound, ours=table[column][GYRO]
-            )
-            for column, bound in ((ROLL, "0.5"), (PITCH, "0.5"), (HEADING, "2"))
-        ]
-        bounds.append(
-            compare_bound(
-                table="velocity at full rate",
-                row=name,
-                column="with a gyro, over interpolated",
-                unit="1",
-                bound="1",
-                ours=table[VELOCITY][GYRO] / table[VELOCITY][STRAIGHT],
-            )
+    attitude = [
+        compare_bound(
+            table="attitude with a gyro", row=name, column=column, unit="deg", bound=bound, ours=table[column][GYRO]
         )
-    return bounds
+        for name, table in simulated.items()
+        for column, bound in ((ROLL, "0.5"), (PITCH, "0.5"), (HEADING, "2"))
+    ]
+    velocity = [
+        compare_bound(
+            table="velocity at full rate",
+            row=name,
+            column="with a gyro, over interpolated",
+            unit="1",
+            bound="1",
+            ours=table[VELOCITY][GYRO] / table[VELOCITY][STRAIGHT],
+        )
+        for name, table in simulated.items()
+    ]
+    return attitude + velocity
 
 
 def _answers(
@@ -243,8 +243,12 @@ def _lines(title: str, tables: Tables) -> list[str]:
     """One table, a row a way, in each recording roll/pitch/heading in degrees and the velocity in m/s."""
     if not tables:
         return []
+
+    def digits(x: float) -> str:
+        return f"{x:.1f}" if x < 10 else f"{x:.0f}"
+
     cells = {
-        name: ["/".join(f"{x:.1f}" for x in row[:3]) + f" {row[3]:.3f}" for row in table.to_numpy()]
+        name: ["/".join(map(digits, row[:3])) + f" {row[3]:.3f}" for row in table.to_numpy()]
         for name, table in tables.items()
     }
     frame = pd.DataFrame(cells, index=next(iter(tables.values())).index).replace("nan/nan/nan", "", regex=True)
