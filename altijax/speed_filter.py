@@ -15,7 +15,7 @@ from altijax import _safe
 from altijax._shapes import require_shape
 from altijax.speed_model import STATES, SpeedNoise, Step, measurements, model_of, state_names, total_roll, walks
 
-_GATE = 3.0
+_GATE, _SIGNIFICANT = 3.0, 3.0
 # What no vehicle on wheels does keeps a filter that lost its way within numbers.
 _LARGEST = {"speed": 300.0, "lateral_speed": 300.0, "vertical_speed": 300.0, "pitch": 1.4, "roll": 1.5}
 _LARGEST |= {"travel_yaw": 1.0, "travel_pitch": 1.0}
@@ -80,7 +80,8 @@ def filter_speed(
     taken to turn about its own upright axis, which on a slope exchanges pitch for roll, and the rest of the roll to
     wander about a mean. With six sensors the IMU's velocity is carried along its own axes, and the point that does not
     slip has neither lateral nor vertical speed. Of the aid only the speed is used. A measurement beyond 3 standard
-    deviations counts as one of a larger error. Where the vehicle stands, its speed and rates are zero.
+    deviations counts as one of a larger error. Where the vehicle stands, its speed and rates are zero. Where the aid
+    has shown that the vehicle shakes the more the faster it is, the vibration is a measurement of the speed.
 
     Parameters
     ----------
@@ -155,8 +156,8 @@ def filter_speed(
         aided=has_aid,
     )
     index = {name: number for number, name in enumerate(names)}
+    gain = index["vibration_gain"]
     rates, observe, travel_speed = model_of(sensors)
-    walk = walks(names, noise, sensors)
 
     def named(x: jax.Array) -> dict[str, jax.Array]:
         return dict(zip(names, x, strict=True))
@@ -178,10 +179,13 @@ def filter_speed(
         steady = step._replace(w_b=step.w_slow, w_end=step.w_slow) if sensors == "6" else step
         F = jax.jacfwd(advance)(x, steady)
         G = jax.jacfwd(lambda w_b: slope(x, step._replace(w_b=w_b)))(step.w_b)
+        walk = walks(named(x), step, noise, sensors)
         gyros = noise.rotation**2 + noise.vibration**2 * step.vibration
         x, P = advance(x, step), F @ P @ F.T + dt * (jnp.diag(walk) + gyros * G @ G.T)
+        # learned while aided, and of use only where that has shown that the car shakes the more the faster it is
+        shaken = x[gain] > _SIGNIFICANT * _safe.sqrt(P[gain, gain])
         linearised_at, y0, H = x, expected(x, step), jax.jacfwd(expected)(x, step)
-        measured = [jnp.stack(column) for column in zip(*measurements(step, noise, sensors), strict=True)]
+        measured = [jnp.stack(column) for column in zip(*measurements(step, noise, sensors, shaken), strict=True)]
 
         def measure(carry: tuple[jax.Array, jax.Array], one: tuple[jax.Array, ...]) -> tuple:
             x, P = carry

@@ -31,7 +31,7 @@ STATES = {
     "gyro_bias_y": 0.01,
     "gyro_bias_z": 0.01,
     "gyro_scale_z": 0.02,
-    "rectification_y": 0.1,
+    "rectification_y": 0.05,
     "travel_yaw": 0.1,
     "travel_pitch": 0.1,
     "lever_x": 1.0,
@@ -40,15 +40,23 @@ STATES = {
     "suspension_roll": 0.03,
     "imu_delay": 0.1,
     "side_slip": 0.003,
+    "vibration_level": 3.0,
+    "vibration_gain": 1.5,
+    "roughness": 0.5,
 }
 """States of the filters and their standard deviations before the first sample, those of a consumer's instrument fixed
 to a car by hand (assumed). SI and radians. With six sensors the speeds are the IMU's along its own axes, else `speed`
 is the vehicle's. `travel_yaw` and `travel_pitch` are the direction of travel seen from the IMU (left and up), the
 levers the IMU's place seen from the point of the vehicle that does not slip sideways. `rectification_y` is the bias of
-w_y for each unit of vibration, `suspension_roll` the roll for each m/s^2 to the left, `imu_delay` by how much the
-stamps of the IMU are later than those of the aid, `side_slip` the lateral speed at the point for each v^2 w_z."""
+w_y for each unit of vibration, `suspension_roll` the roll for each m/s^2 to the left, that of the usual cant included,
+`imu_delay` by how much the stamps of the IMU are later than those of the aid, `side_slip` the lateral speed at the
+point for each v^2 w_z. The logarithm of the vibration is `vibration_level` at standstill, grows by `vibration_gain` for
+each e-fold of the speed, and has `roughness` from the road."""
 
 _STEEPEST = 1.4
+# A pitch vibration to compare with, the speed below which it is the engine's and no longer the road's, and for how
+# long, in s, a road stays as rough as it is (assumed: some hundred metres).
+_USUAL_VIBRATION, _LEAST_VIBRATION, _IDLE_SPEED, _ROUGHNESS_TIME = 0.004, 1e-8, 3.0, 25.0
 _STILL_SPEED, _STILL_RATE = 0.02, 0.003
 
 
@@ -75,6 +83,10 @@ class SpeedNoise:
         Error of "no lateral speed" in one step, with six sensors.
     vertical_speed : () m/s
         Error of "no vertical speed" in one step, with six sensors.
+    roughness : ()
+        Standard deviation of the logarithm of the vibration that the road makes, about its mean for a speed.
+    roughness_scatter : ()
+        The same in one step, without memory.
     aid : () m/s
         Error of the aid.
     accelerometer_walk : () m/s^2/sqrt(s)
@@ -93,6 +105,8 @@ class SpeedNoise:
     lateral: ArrayLike = 0.15
     lateral_speed: ArrayLike = 0.05
     vertical_speed: ArrayLike = 0.1
+    roughness: ArrayLike = 0.5
+    roughness_scatter: ArrayLike = 1.0
     aid: ArrayLike = 0.1
     accelerometer_walk: ArrayLike = 0.003
     gyro_walk: ArrayLike = 0.0001
@@ -216,7 +230,12 @@ def _rates(x: States, step: Step, gravity: jax.Array, noise: SpeedNoise) -> Stat
         roll_rate = -w_z * u_z / u_x - _tangent(pitch) * turn + towards_mean
     else:
         roll_rate = w_x - _tangent(pitch) * turn
-    return {"speed": acceleration, "pitch": -w_y * jnp.cos(roll) + w_z * jnp.sin(roll), "roll": roll_rate}
+    return {
+        "speed": acceleration,
+        "pitch": -w_y * jnp.cos(roll) + w_z * jnp.sin(roll),
+        "roll": roll_rate,
+        "roughness": -x["roughness"] / _ROUGHNESS_TIME,
+    }
 
 
 def _expected(x: States, middle: States, rate: States, step: Step, gravity: jax.Array) -> list[jax.Array]:
@@ -228,7 +247,7 @@ def _expected(x: States, middle: States, rate: States, step: Step, gravity: jax.
     f_y += gravity * jnp.cos(middle["pitch"]) * jnp.sin(total_roll(middle, step)) + step.w_dot[2] * x["lever_x"]
     if "lever_z" in x:
         f_y -= step.w_dot[0] * x["lever_z"]
-    return [f_y, _at_aid(x, x["speed"], step), x["speed"], *_rates_at_rest(x, step)]
+    return [f_y, _at_aid(x, x["speed"], step), x["speed"], _shaking(x, x["speed"]), *_rates_at_rest(x, step)]
 
 
 def _rates_of_six(x: States, step: Step, gravity: jax.Array, noise: SpeedNoise) -> States:
@@ -246,6 +265,7 @@ def _rates_of_six(x: States, step: Step, gravity: jax.Array, noise: SpeedNoise) 
         "vertical_speed": a[2],
         "pitch": -w[1] * jnp.cos(roll) + w[2] * jnp.sin(roll),
         "roll": w[0] - _tangent(pitch) * turn,
+        "roughness": -x["roughness"] / _ROUGHNESS_TIME,
     }
 
 
@@ -253,7 +273,7 @@ def _expected_of_six(x: States, middle: States, rate: States, step: Step, gravit
     """What `measurements` should be with six sensors."""
     forward, left, up = _velocity_of_point(x, step)
     slip = left + x["side_slip"] * forward * forward * (step.w_end[2] - x["gyro_bias_z"])
-    return [slip, up, _at_aid(x, forward, step), forward, *_rates_at_rest(x, step)]
+    return [slip, up, _at_aid(x, forward, step), forward, _shaking(x, forward), *_rates_at_rest(x, step)]
 
 
 def _travel_speed_of_six(x: States, step: Step) -> jax.Array:
@@ -275,13 +295,21 @@ def _at_aid(x: States, speed: jax.Array, step: Step) -> jax.Array:
     return speed + (x["imu_delay"] + step.aid_lead) * step.aid_acceleration
 
 
+def _shaking(x: States, speed: jax.Array) -> jax.Array:
+    """Logarithm of the vibration: a power of the speed, times what the road under it makes of that."""
+    moving = 0.5 * jnp.log(1 + (speed / _IDLE_SPEED) ** 2)
+    return x["vibration_level"] + x["vibration_gain"] * moving + x["roughness"]
+
+
 def _rates_at_rest(x: States, step: Step) -> list[jax.Array]:
     w_y = x["gyro_bias_y"] + x["rectification_y"] * step.vibration
     return [w_y, x["gyro_bias_z"]] + ([x["gyro_bias_x"]] if "gyro_bias_x" in x else [])
 
 
-def measurements(step: Step, noise: SpeedNoise, sensors: str) -> list[tuple[jax.Array, ArrayLike, jax.Array]]:
-    """Measured value, standard deviation, and whether there is one."""
+def measurements(
+    step: Step, noise: SpeedNoise, sensors: str, shaken: jax.Array
+) -> list[tuple[jax.Array, ArrayLike, jax.Array]]:
+    """Measured value, standard deviation, and whether there is one; `shaken` says if the vibration tells the speed."""
     zero, moving = jnp.zeros_like(step.aid_speed), ~step.still
     constraints: list[tuple[jax.Array, ArrayLike, jax.Array]] = (
         [(zero, level, moving) for level in (noise.lateral_speed, noise.vertical_speed)]
@@ -292,19 +320,24 @@ def measurements(step: Step, noise: SpeedNoise, sensors: str) -> list[tuple[jax.
         (step.w_b[axis], jnp.full_like(zero, _STILL_RATE), step.still)
         for axis in ((1, 2) if sensors == "2+2" else (1, 2, 0))
     ]
+    shaking = jnp.log(jnp.maximum(step.vibration, _LEAST_VIBRATION) / _USUAL_VIBRATION)
     return [
         *constraints,
         (step.aid_speed, noise.aid, step.aided),
         (zero, jnp.full_like(zero, _STILL_SPEED), step.still),
+        (shaking, noise.roughness_scatter, step.aided | shaken),
         *at_rest,
     ]
 
 
-def walks(names: tuple[str, ...], noise: SpeedNoise, sensors: str) -> jax.Array:
+def walks(x: States, step: Step, noise: SpeedNoise, sensors: str) -> jax.Array:
     """Growth of the states' variances, each second."""
-    growth = {"roll": 2 * noise.road_roll**2 / noise.road_roll_time} if sensors == "2+2" else {}
-    growth |= dict.fromkeys(("speed", "lateral_speed", "vertical_speed"), noise.acceleration**2)
+    names = tuple(x)
+    growth = dict.fromkeys(("speed", "lateral_speed", "vertical_speed"), noise.acceleration**2)
     growth |= {name: noise.accelerometer_walk**2 for name in names if name.startswith("accelerometer_bias")}
     growth |= {name: noise.gyro_walk**2 for name in names if name.startswith("gyro_bias")}
     growth["imu_delay"] = noise.delay_walk**2
+    growth["roughness"] = 2 * noise.roughness**2 / _ROUGHNESS_TIME
+    if sensors == "2+2":
+        growth["roll"] = 2 * noise.road_roll**2 / noise.road_roll_time
     return jnp.stack([growth.get(name, jnp.zeros_like(noise.aid)) for name in names])

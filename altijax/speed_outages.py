@@ -113,7 +113,7 @@ def outage_errors(
     for _, method, sensors in split:
         require_options(method, sensors or "auto")
     with jax.enable_x64(True):
-        drive = drive_in_steps(recording, None)
+        drive = drive_in_steps(recording, None, first)
         t_truth, truth = _truth(recording, drive)
         last = min(drive.ends[-1], t_truth[-1])
         starts = np.arange(first, last - min(durations), every)

@@ -1,6 +1,6 @@
 """A recording in the steps of the speed filter: mean readings, vibration, standstills, and the aid up to its end."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pandas as pd
@@ -43,8 +43,11 @@ class SpeedDrive:
     gravity: float
 
 
-def drive_in_steps(recording: Recording, calibration: Calibration | None) -> SpeedDrive:
-    """Readings of a recording, corrected by what was calibrated; `t_aid` are the aid's stamps less its delay."""
+def drive_in_steps(recording: Recording, calibration: Calibration | None, until: float) -> SpeedDrive:
+    """Readings of a recording, corrected by what was calibrated; `t_aid` are the aid's stamps less its delay.
+
+    The aid is kept whole, for `steps_until` to cut, but gravity is that of the places up to `until`.
+    """
     imu, start = imu_of(recording), start_of(recording)
     t = imu.index.to_numpy(float) - start
     if "gx" not in imu or t[-1] < _SHORTEST:
@@ -68,6 +71,7 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None) -> Spe
     )
     deviation = rolling.std().fillna(np.inf).to_numpy()
     t_aid, aid = _aid(recording)
+    gnss = recording.gnss
     return SpeedDrive(
         t=t,
         f_b=f_b,
@@ -80,7 +84,7 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None) -> Spe
         stamp_aid=t_aid - start,
         t_aid=t_aid - start - values.get("gnss_delay" if recording.wheel is None else "wheel_delay", 0.0),
         aid=aid * (values.get("wheel_scale", 1.0) if recording.wheel is not None else 1.0),
-        gravity=gravity_at(recording),
+        gravity=gravity_at(replace(recording, gnss=None if gnss is None else gnss[: start + until])),
     )
 
 
@@ -103,7 +107,8 @@ def _means(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 def _aid(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     if recording.wheel is not None:
-        return recording.wheel.index.to_numpy(float), recording.wheel["speed"].to_numpy(float)
+        speed = recording.wheel["speed"].dropna()
+        return speed.index.to_numpy(float), speed.to_numpy(float)
     if recording.gnss is not None:
         return speed_of(recording.gnss)
     return np.zeros(0), np.zeros(0)

@@ -62,7 +62,7 @@ def test_initial_values_replace_the_aid(drive: Recording) -> None:
 
 def test_noise_levels_are_those_of_the_drive(drive: Recording) -> None:
     with jax.enable_x64(True):
-        steps = drive_in_steps(drive, None)
+        steps = drive_in_steps(drive, None, 20.0)
         found = fit_noise(steps, 39.0, "2+3", initial_state(steps, 40.0, None, None), NOMINAL_NOISE)
     # two readings of 0.02 m/s in each step
     assert found["aid"] == pytest.approx(0.014, rel=0.4)

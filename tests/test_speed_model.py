@@ -102,7 +102,7 @@ def test_measurements_are_what_is_expected_of_the_true_states(sensors: str) -> N
         assert model.travel_speed(x, step) == pytest.approx(float(found[i, 0]), abs=1e-9)
         rates = model.rates(x, step, G, SpeedNoise())
         expected = model.expected(x, x, rates, step, G)
-        measured = [value for value, _, _ in measurements(step, SpeedNoise(), sensors)]
+        measured = [value for value, _, _ in measurements(step, SpeedNoise(), sensors, jnp.array(True))]
         assert len(expected) == len(measured)
         # without a roll gyro w_x is that of a turn about the car's upright axis
         checked = {"2+2": 0, "2+3": 1, "6": 2}[sensors]

@@ -1,20 +1,32 @@
 """The patent's equations, its figures in small, and what is said of both."""
 
+from functools import partial
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+import pandas as pd
 import pytest
 
+from altijax import speed_estimates
+from altijax.datasets import DatasetNotFoundError
+from altijax.recordings import Recording
+from altijax.speed_outages import outage_table
 from papers_repro.comparison import Report
 from papers_repro.report import deviations
+from papers_repro.us20060293826 import outages
 from papers_repro.us20060293826 import reproduce as paper
 from papers_repro.us20060293826.equations import EXACT, Equation, equation_findings, equations, unexplained
 from papers_repro.us20060293826.experiments import calibrated_readings, figure_drives, readings_of, turning_of
 from papers_repro.us20060293826.stability import curvy_drive, error_growth
+from tests.made_drives import curvy_recording
 
 CHECKED = equations()
+
+
+def _no_dataset(name: str) -> Recording:
+    raise DatasetNotFoundError(name)
 
 
 @pytest.fixture(scope="module")
@@ -22,6 +34,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Report, Path]:
     """All of it, with fewer runs and a smaller map."""
     output = tmp_path_factory.mktemp("results")
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(outages, "load_dataset", _no_dataset)
         patch.setattr(paper, "RUNS", 16)
         patch.setattr(paper, "SWINGS", (1.0, 3.0))
         patch.setattr(paper, "QUALITIES", (0.3, 3.0))
@@ -104,3 +117,15 @@ def test_growth_is_that_of_the_linearised_equation():
 )
 def test_limit_of_the_region(share, expected):
     assert paper._limit([1.0, 2.0, 3.0], share) == expected
+
+
+def test_real_outages_are_shown_or_said_to_be_missing(small, tmp_path, monkeypatch):
+    assert small[0].remarks[-1].startswith("No real outages: rtk-drive is not here")
+    monkeypatch.setattr(outages, "load_dataset", lambda name: curvy_recording())
+    monkeypatch.setattr(outages, "outage_table", partial(outage_table, durations=(5.0, 15.0), first=14.0))
+    monkeypatch.setattr(speed_estimates, "_FIT_FROM", np.inf)
+    lines = outages.real_outages(tmp_path)
+    assert lines[2].split() == ["after", "(outages)", "5", "s", "(3)", "15", "s", "(2)"]
+    assert len(lines) == 3 + len(outages.METHODS)
+    table = pd.read_csv(tmp_path / "outages.csv")
+    assert set(table["method"]) == set(outages.METHODS) and np.isfinite(table["rms"]).all()

@@ -12,6 +12,7 @@ import numpy as np
 from papers_repro.comparison import Comparison, Finding, Report, compare_bound
 from papers_repro.us20060293826.equations import EXACT, equation_findings, equations, unexplained
 from papers_repro.us20060293826.experiments import METHODS, Runs, figure_drives, rms_errors, simulate, winding_drive
+from papers_repro.us20060293826.outages import real_outages
 from papers_repro.us20060293826.pictures import draw_figure, draw_growth, draw_map
 from papers_repro.us20060293826.stability import Growth, curvy_drive, error_growth
 
@@ -22,7 +23,7 @@ SWINGS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
 def reproduce(output: Path) -> Report:
-    """Both figures, the map and the growth of errors; pictures and errors.csv go to `output`."""
+    """Both figures, the map, the growth of errors, real outages; pictures, errors.csv, outages.csv go to `output`."""
     with jax.enable_x64(True):
         return _report(output)
 
@@ -58,6 +59,7 @@ def _report(output: Path) -> Report:
             f"Equations {', '.join(e.number for e in exact)} hold as printed, to {max(e.printed for e in exact):.0e}; "
             f"no correction found for: {', '.join(unexplained(checked)) or 'none'}.",
             *_error_lines(figures),
+            *real_outages(output),
         ],
     )
 
