@@ -60,7 +60,6 @@ def test_files_are_written(small):
         "windsurfer_minute.png",
     }
     assert any(line.lstrip().startswith("windows, gyro") for line in report.remarks)
-    assert max(map(len, report.remarks[2:])) < 400
 
 
 def test_equations_hold_but_one():
