@@ -1,4 +1,4 @@
-"""Part (a): every derived number of tables 1 to 5 computed again, and an audit of what the tables and the text say."""
+"""Tables 1 to 5: every derived number computed again, an audit of tables and text, and the experiments simulated."""
 
 import tomllib
 from pathlib import Path
@@ -14,19 +14,24 @@ FOLDER = Path(__file__).parent
 
 
 def reproduce(output: Path) -> Report:
-    """Comparisons and findings of the printed tables; nothing further is written to `output`."""
+    """What the printed numbers say among themselves and what simulations say of them; pictures go to `output`."""
+    # Only here, as the audit of printed numbers does not need JAX.
+    from papers_repro.shirai2000.simulated import simulated
+
     paper = tomllib.loads((FOLDER / "paper.toml").read_text())
     rows = read_tables(FOLDER / "tables.csv")
     wheel = paper["instruments"]["vehicle_speed"]
+    lines, comparisons, findings = simulated(rows, paper, output)
     return Report(
         title=f"{', '.join(paper['authors'])} ({paper['year']}): {paper['title']}",
-        comparisons=compare_derived(rows),
+        comparisons=[*compare_derived(rows), *comparisons],
         findings=[
             *audit(rows),
             *statements(rows, paper),
             *deductions(rows),
             *wheel_findings(rows, wheel_sensor="vehicle_speed", pulses_per_turn=wheel["pulses_per_turn"]),
+            *findings,
         ],
-        tables=paper["tables"],
-        remarks=paper["remarks"],
+        tables=paper["tables"] | paper["simulated_tables"],
+        remarks=[*paper["remarks"], *lines],
     )
