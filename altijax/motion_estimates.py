@@ -11,7 +11,7 @@ from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation, Slerp
 
 from altijax.drives import imu_of, start_of
-from altijax.estimates import Calibration
+from altijax.calibrations import Calibration
 from altijax.motion_intervals import MotionReadings, instants_at
 from altijax.motion_model import MotionNoise, Trajectory
 from altijax.motion_readings import motion_readings
@@ -416,7 +416,8 @@ def _supported(readings: MotionReadings, t: np.ndarray, delay: float) -> np.ndar
     k = np.searchsorted(epochs, t)
     before = t - epochs[np.clip(k - 1, 0, epochs.size - 1)]
     after = epochs[np.clip(k, 0, epochs.size - 1)] - t
-    near = np.where(k == 0, after, np.where(k == epochs.size, before, before + after)) <= longest
+    beyond = (k == 0) | (k == epochs.size)
+    near = np.where(beyond, np.maximum(before, after) <= 2 * float(readings.spacing), before + after <= longest)
     usual = float(np.median(np.diff(t)))
     gap = np.diff(t, prepend=t[0]) > max(5 * usual, 0.1)
     return near & ~gap

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from altijax.motion_intervals import MotionReadings, instants_at, intervals_between
 from altijax.motion_model import Trajectory
 from altijax.preintegration import relative_attitudes
-from altijax.rotations import euler_to_matrix, interpolate_rotations, rotvec_to_matrix
+from altijax.rotations import euler_to_matrix, interpolate_rotations, matrix_to_rotvec, rotvec_to_matrix
 from altijax.wahba import fit_windows
 
 # Error of a mean acceleration over one second, m/s^2: Doppler noise and vibration.
@@ -65,12 +65,9 @@ def window_attitudes(
     shared = fit_windows(
         f_b, f_n, C0, jnp.full_like(dt, prior_std), std, window=window, C_gyro=begins @ half if gyro else None
     )
-    t_middle = 0.5 * (t[1:] + t[:-1])
-    # Intervals of no length would make times repeat.
-    t_middle = t_middle + 1e-9 * jnp.arange(t_middle.size)
     zero = jnp.zeros_like(v)
     trajectory = Trajectory(
-        C_nb=interpolate_rotations(t, t_middle, shared.C_nb),
+        C_nb=_at_instants(t, shared.C_nb, half, C[:, -1], gyro=gyro),
         v_n=v,
         accelerometer_bias=zero,
         gyro_bias=zero,
@@ -79,6 +76,18 @@ def window_attitudes(
     covariance = jnp.concatenate([shared.covariance[:1], shared.covariance])
     misfit = jnp.sum(whole * shared.misfit**2) / jnp.maximum(jnp.sum(whole), 1)
     return trajectory, covariance, misfit
+
+
+def _at_instants(t: jax.Array, C_middle: jax.Array, half: jax.Array, whole: jax.Array, *, gyro: bool) -> jax.Array:
+    """Attitudes at the instants from those amid the intervals: carried by the gyro from both sides and averaged."""
+    if gyro:
+        begin = C_middle @ jnp.swapaxes(half, -1, -2)
+        end = begin @ whole
+        ahead, behind = jnp.concatenate([begin, end[-1:]]), jnp.concatenate([begin[:1], end])
+        return ahead @ rotvec_to_matrix(0.5 * matrix_to_rotvec(jnp.swapaxes(ahead, -1, -2) @ behind))
+    # Intervals of no length would make times repeat.
+    t_middle = 0.5 * (t[1:] + t[:-1])
+    return interpolate_rotations(t, t_middle + 1e-9 * jnp.arange(t_middle.size), C_middle)
 
 
 def _joined(t: jax.Array, v: jax.Array, std: jax.Array) -> jax.Array:

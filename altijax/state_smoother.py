@@ -101,15 +101,15 @@ def filter_states(
         P_after = P - gain @ cross.T
         return x + gain @ innovation, 0.5 * (P_after + P_after.T), (gain, innovation, precision, log_likelihood)
 
-    def step(state: tuple, inputs: tuple) -> tuple:
+    def step(state: tuple, inputs: tuple) -> tuple[tuple, tuple]:
         x, P = state
         z, H, R, F, c, Q = inputs
         x_after, P_after, met = update(x, P, z, H, R)
         return (F @ x_after + c, F @ P_after @ F.T + Q), (x, P, *met)
 
     last, before = jax.lax.scan(step, (x0, P0), (z[:-1], H[:-1], R[:-1], F, c, Q))
-    final: tuple = (*last, *update(*last, z[-1], H[-1], R[-1])[2])
-    seen = [jnp.concatenate([a, b[None]]) for a, b in zip(before, final, strict=True)]
+    final = (*last, *update(*last, z[-1], H[-1], R[-1])[2])
+    seen = jax.tree.map(lambda a, b: jnp.concatenate([a, b[None]]), before, final)
     return Filtered(x=seen[0], P=seen[1], gain=seen[2], innovation=seen[3], precision=seen[4], log_likelihood=seen[5])
 
 
