@@ -114,7 +114,7 @@ def experiments_of(rows: Sequence[Row]) -> tuple[list[tuple[str, str]], Experime
     )
 
 
-def sensors_of(unknowns: jax.Array, indoors: jax.Array) -> Sensors:
+def sensors_of(unknowns: jax.Array, indoors: jax.Array | np.ndarray) -> Sensors:
     """The sensors that standardised unknowns (12,) stand for."""
     centre, spread = jnp.asarray([PRIORS[name] for name in NAMES], unknowns.dtype).T
     values = jnp.where(jnp.arange(len(NAMES)) == SCALE, centre + spread * unknowns, centre * jnp.exp(spread * unknowns))
@@ -213,7 +213,7 @@ def _elevations(sensors: Sensors, course: Course, site: Site) -> tuple[jax.Array
     )
 
 
-def _normal(error: jax.Array, covariance: jax.Array) -> jax.Array:
+def _normal(error: jax.Array | np.ndarray, covariance: jax.Array) -> jax.Array:
     """Logarithm of a normal density of those elements that are finite."""
     known = jnp.isfinite(error)
     error = jnp.where(known, error, 0)
