@@ -17,7 +17,7 @@ The trajectory need not obey its own dynamics: what is missing at each step is p
 linearisation and smoothing is the Gauss-Newton method on the whole record and ends at its most probable trajectory.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
@@ -136,7 +136,19 @@ def preintegrated_intervals(trajectory: Trajectory, intervals: Intervals) -> tup
     by_gyro = relative_attitudes(w_b, dt)
     reached = jnp.swapaxes(C, -1, -2) @ trajectory.C_nb[1:]
     turn = matrix_to_rotvec(reached @ jnp.swapaxes(by_gyro[:, -1], -1, -2))
-    return preintegrate(f_b, w_b, by_gyro, turn, dt), jnp.einsum("kij,kj->ki", C, turn)
+    summed = preintegrate(f_b, w_b, by_gyro, turn, dt)
+    bias = trajectory.gyro_bias[:-1, None]
+
+    def by_raw_rate(columns: jax.Array) -> jax.Array:
+        """The scale multiplies the reading before the bias is taken off."""
+        return columns.at[..., 3:].set((columns[..., 3:] - bias * columns[..., :3]) / scale)
+
+    summed = replace(
+        summed,
+        turn_by_gyro=by_raw_rate(summed.turn_by_gyro),
+        velocity_by_gyro=by_raw_rate(summed.velocity_by_gyro),
+    )
+    return summed, jnp.einsum("kij,kj->ki", C, turn)
 
 
 def motion_transitions(
