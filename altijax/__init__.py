@@ -53,6 +53,12 @@ References
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from altijax.allan import (
+    AllanFit,
+    allan_deviation,
+    averaging_factors,
+    fit_allan,
+)
 from altijax.altitude import (
     elevation_by_norm,
     elevation_by_slope,
@@ -60,6 +66,17 @@ from altijax.altitude import (
     horizontal_distance,
     slope_sine,
     vertical_acceleration,
+)
+from altijax.attitude import (
+    AttitudeFit,
+    course_attitude,
+    fit_attitude,
+    fit_attitudes,
+    hold_attitudes,
+)
+from altijax.delays import (
+    Delay,
+    estimate_delay,
 )
 from altijax.doppler import (
     DopplerReceiver,
@@ -74,6 +91,12 @@ from altijax.earth import (
     geodetic_to_ecef,
     geodetic_to_enu,
     normal_gravity,
+)
+from altijax.identifiability import (
+    Identification,
+    describe_undetermined,
+    identify,
+    information_gain,
 )
 from altijax.instruments import (
     DOPPLER_1_HZ,
@@ -113,6 +136,9 @@ from altijax.roads import (
     slope_road,
     winding_road,
 )
+from altijax.rotation_splines import (
+    rotation_spline,
+)
 from altijax.rotations import (
     euler_to_matrix,
     heading_to_yaw,
@@ -136,13 +162,24 @@ from altijax.sensors import (
     gyro_output,
     saturated,
 )
+from altijax.serial_correlation import (
+    mean_with_std,
+    statistical_inefficiency,
+)
 from altijax.signals import (
     cumulative_integral,
     derivative,
     fourier_interval_means,
     fourier_reconstruction,
+    interval_means,
     low_pass,
+    periodic_extension,
     resample,
+)
+from altijax.smoothing import (
+    SmoothVelocity,
+    match_endpoints,
+    smooth_velocity,
 )
 from altijax.speed import (
     pitch_rate,
@@ -152,6 +189,36 @@ from altijax.speed import (
     speed_with_aided_roll,
     speed_with_roll,
     speed_without_roll,
+)
+from altijax.speed_filter import (
+    SpeedTrack,
+    filter_speed,
+)
+from altijax.speed_model import (
+    SpeedNoise,
+    state_names,
+)
+from altijax.standstill import (
+    means_at_rest,
+    still_samples,
+)
+from altijax.static_calibration import (
+    SensorFit,
+    fit_accelerometer_positions,
+    fit_accelerometer_temperature,
+    fit_gyro_at_rest,
+    fit_gyro_temperature,
+)
+from altijax.strapdown import (
+    integrate_attitude,
+    integrate_position,
+    integrate_velocity,
+)
+from altijax.wahba import (
+    SharedAttitude,
+    fit_shared_attitude,
+    fit_windows,
+    nearest_rotation,
 )
 from altijax.wheels import (
     WheelSensor,
@@ -166,6 +233,9 @@ from altijax.wheels import (
 )
 
 if TYPE_CHECKING:
+    from altijax.calibrations import (
+        Calibration,
+    )
     from altijax.datasets import (
         DatasetNotFoundError,
         dataset_path,
@@ -176,10 +246,16 @@ if TYPE_CHECKING:
         gravity_at,
     )
     from altijax.estimates import (
-        Calibration,
         calibrate,
         estimate_elevation,
         score_elevation,
+    )
+    from altijax.motion_estimates import (
+        estimate_motion,
+    )
+    from altijax.motion_scores import (
+        score_motion,
+        withheld_gnss_errors,
     )
     from altijax.plots import (
         plot_elevation,
@@ -192,6 +268,13 @@ if TYPE_CHECKING:
         RecordingWarning,
         describe,
         read_recording,
+    )
+    from altijax.speed_estimates import (
+        estimate_speed,
+    )
+    from altijax.speed_outages import (
+        outage_errors,
+        outage_table,
     )
 
 # Files and tables need pandas, pictures matplotlib: both are imported on first use only.
@@ -206,10 +289,16 @@ _LAZY = {
     "list_datasets": "datasets",
     "load_dataset": "datasets",
     "gravity_at": "drives",
-    "Calibration": "estimates",
+    "Calibration": "calibrations",
     "calibrate": "estimates",
     "estimate_elevation": "estimates",
     "score_elevation": "estimates",
+    "estimate_speed": "speed_estimates",
+    "outage_errors": "speed_outages",
+    "outage_table": "speed_outages",
+    "estimate_motion": "motion_estimates",
+    "score_motion": "motion_scores",
+    "withheld_gnss_errors": "motion_scores",
     "plot_elevation": "plots",
     "plot_elevation_error": "plots",
     "plot_streams": "plots",
@@ -224,40 +313,66 @@ __all__ = [
     "ND_PG1",
     "VIBRATION_GYRO",
     "Accelerometer",
+    "AllanFit",
+    "AttitudeFit",
     "Calibration",
     "DatasetNotFoundError",
+    "Delay",
     "DopplerReceiver",
     "Fit",
     "Gyro",
+    "Identification",
     "Readings",
     "Recording",
     "RecordingError",
     "RecordingWarning",
     "Road",
+    "SensorFit",
+    "SharedAttitude",
+    "SmoothVelocity",
+    "SpeedNoise",
     "SpeedProfile",
+    "SpeedTrack",
     "WheelSensor",
     "Windsurfer",
     "accelerometer_output",
     "accuracy_denominator",
+    "allan_deviation",
+    "averaging_factors",
     "calibrate",
     "circular_road",
     "correct_accelerometer",
     "correct_gyro",
     "correct_wheel_speeds",
+    "course_attitude",
     "course_to_velocity",
     "coverage",
     "cumulative_integral",
     "dataset_path",
     "derivative",
     "describe",
+    "describe_undetermined",
     "doppler_velocity",
     "ecef_to_geodetic",
     "elevation_by_norm",
     "elevation_by_slope",
     "enu_axes",
     "enu_to_geodetic",
+    "estimate_delay",
     "estimate_elevation",
+    "estimate_motion",
+    "estimate_speed",
     "euler_to_matrix",
+    "filter_speed",
+    "fit_accelerometer_positions",
+    "fit_accelerometer_temperature",
+    "fit_allan",
+    "fit_attitude",
+    "fit_attitudes",
+    "fit_gyro_at_rest",
+    "fit_gyro_temperature",
+    "fit_shared_attitude",
+    "fit_windows",
     "flight_pose",
     "fourier_interval_means",
     "fourier_reconstruction",
@@ -267,18 +382,32 @@ __all__ = [
     "gybing_windsurfer",
     "gyro_output",
     "heading_to_yaw",
+    "hold_attitudes",
     "horizontal_acceleration",
     "horizontal_distance",
     "ideal_readings",
+    "identify",
+    "information_gain",
+    "integrate_attitude",
+    "integrate_position",
+    "integrate_velocity",
     "interpolate_rotations",
+    "interval_means",
     "levenberg_marquardt",
     "list_datasets",
     "load_dataset",
     "low_pass",
+    "match_endpoints",
     "matrix_to_euler",
     "matrix_to_quaternion",
     "matrix_to_rotvec",
+    "mean_with_std",
+    "means_at_rest",
+    "nearest_rotation",
     "normal_gravity",
+    "outage_errors",
+    "outage_table",
+    "periodic_extension",
     "pitch_rate",
     "plot_elevation",
     "plot_elevation_error",
@@ -295,18 +424,24 @@ __all__ = [
     "road_curve",
     "road_pose",
     "roll_angle",
+    "rotation_spline",
     "rotvec_to_matrix",
     "saturated",
     "score_elevation",
+    "score_motion",
     "skew",
     "slope_road",
     "slope_sine",
+    "smooth_velocity",
     "speed_error_growth",
     "speed_from_pulses",
     "speed_with_aided_roll",
     "speed_with_roll",
     "speed_without_roll",
     "standstill_from_pulses",
+    "state_names",
+    "statistical_inefficiency",
+    "still_samples",
     "vee",
     "velocity_to_course",
     "vertical_acceleration",
@@ -315,6 +450,7 @@ __all__ = [
     "wheel_speeds",
     "winding_road",
     "windsurfer_pose",
+    "withheld_gnss_errors",
     "wrap_angle",
     "yaw_rate_from_wheels",
     "yaw_to_heading",

@@ -290,7 +290,7 @@ def _minima(f_b: jax.Array, f_n: jax.Array, euler0: jax.Array, ratio: jax.Array)
         return jax.lax.fori_loop(0, -(-jnp.sum(~arrived) // RESCUED_AT_ONCE), fit_some, found)
 
     found = change, jnp.full(epochs, CONVERGED)
-    return jax.lax.cond(arrived.all(), lambda found: found, rescue, found)
+    return jax.lax.cond(arrived.all(), lambda found: found, rescue, found) if epochs else found
 
 
 @_minima.defjvp

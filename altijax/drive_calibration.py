@@ -233,15 +233,15 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
             Stretch(
                 f=f_mean[k],
                 w=w_mean[k],
-                C_nb=np.asarray(euler_to_matrix(jnp.asarray(euler))),
-                gravity=np.asarray(gravity),
-                noise=np.array([noise["gyro"], noise["accelerometer"]]) / 2**0.5,
+                C_nb=euler_to_matrix(jnp.asarray(euler)),
+                gravity=jnp.asarray(gravity),
+                noise=jnp.asarray([noise["gyro"], noise["accelerometer"]]) / 2**0.5,
                 t_gnss=t_gnss[epochs] - start,
                 v_gnss=np.nan_to_num(v_gnss[epochs]),
-                gnss_std=np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf),
+                gnss_std=jnp.asarray(np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf)),
                 t_wheel=t_wheel[samples] - start,
                 wheel=wheel[samples],
-                wheel_std=np.broadcast_to(_FIRST_STD[2:], (samples.sum(), 3)),
+                wheel_std=jnp.asarray(np.broadcast_to(_FIRST_STD[2:], (samples.sum(), 3))),
             )
         )
     return _stacked(pieces)
@@ -337,7 +337,9 @@ def _stacked(pieces: Iterable[Stretch]) -> Stretch:
         return np.pad(values, ends, constant_values=np.inf if name.endswith("_std") else 0.0)
 
     names = vars(pieces[0])
-    return Stretch(**{name: np.concatenate([filled(name, getattr(p, name)) for p in pieces]) for name in names})
+    return Stretch(
+        **{name: jnp.asarray(np.concatenate([filled(name, getattr(p, name)) for p in pieces])) for name in names}
+    )
 
 
 def _ordered(names: Sequence[str]) -> tuple[str, ...]:

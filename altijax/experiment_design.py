@@ -4,6 +4,8 @@ The information about the parameters of `DRIVE_PARAMETERS` that a drive of given
 function of them, so its derivatives say what to change: more braking, a stop, a bend, a hill.
 """
 
+from collections.abc import Sequence
+
 import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
@@ -29,8 +31,8 @@ _STEPS = 4 * STEPS_OF_INTERVAL
 
 def drive_information(
     manoeuvres: Manoeuvres,
-    noise: ArrayLike = (0.05, 0.1, 0.02, 0.05, 0.1),
-    imu_noise: ArrayLike = (1.4e-4, 3.5e-3),
+    noise: Sequence[float] = (0.05, 0.1, 0.02, 0.05, 0.1),
+    imu_noise: Sequence[float] = (1.4e-4, 3.5e-3),
     *,
     minutes: int = 5,
     rate: int = 1,
@@ -60,10 +62,10 @@ def drive_information(
     ValueError
         If the shapes do not fit.
     """
-    noise = require_shape("noise", noise, (5,))
-    imu_noise = require_shape("imu_noise", imu_noise, (2,))
+    levels = require_shape("noise", jnp.asarray(noise), (5,))
+    walks = require_shape("imu_noise", jnp.asarray(imu_noise), (2,))
     stretches = round(60 / (STEP * _STEPS))
-    t = STEP * jnp.arange(stretches * _STEPS, dtype=noise.dtype)
+    t = STEP * jnp.arange(stretches * _STEPS, dtype=levels.dtype)
     middle = town_drive(manoeuvres, t + STEP / 2, STANDARD_GRAVITY, legs=1)
     node = town_drive(manoeuvres, t, STANDARD_GRAVITY, legs=1)
 
@@ -79,19 +81,19 @@ def drive_information(
         f=cut(middle.f_b),
         w=cut(middle.w_b),
         C_nb=cut(node.C_nb)[:, 0],
-        gravity=jnp.full(stretches, STANDARD_GRAVITY, noise.dtype),
-        noise=jnp.tile(imu_noise, (stretches, 1)),
+        gravity=jnp.full(stretches, STANDARD_GRAVITY, levels.dtype),
+        noise=jnp.tile(walks, (stretches, 1)),
         t_gnss=times(gnss),
         v_gnss=v_gnss,
-        gnss_std=jnp.broadcast_to(noise[:2], (*v_gnss.shape[:2], 2)),
+        gnss_std=jnp.broadcast_to(levels[:2], (*v_gnss.shape[:2], 2)),
         t_wheel=times(wheel),
         wheel=speed,
-        wheel_std=jnp.broadcast_to(noise[2:], (*speed.shape, 3)),
+        wheel_std=jnp.broadcast_to(levels[2:], (*speed.shape, 3)),
     )
     states = own_states(_STEPS)
-    own = jnp.zeros((stretches, states), noise.dtype).at[:, 3:6].set(v_gnss[:, 0])
-    own_std = jnp.ones(states, noise.dtype).at[:3].set(0.5).at[3:6].set(5.0)
-    nominal = jnp.asarray([row[0] for row in DRIVE_PARAMETERS.values()], noise.dtype)
+    own = jnp.zeros((stretches, states), levels.dtype).at[:, 3:6].set(v_gnss[:, 0])
+    own_std = jnp.ones(states, levels.dtype).at[:3].set(0.5).at[3:6].set(5.0)
+    nominal = jnp.asarray([row[0] for row in DRIVE_PARAMETERS.values()], levels.dtype)
     return minutes * shared_information(drive_residuals, data, nominal, own, own_std)
 
 

@@ -10,8 +10,8 @@ import pandas as pd
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation, Slerp
 
-from altijax.drives import imu_of, start_of
 from altijax.calibrations import Calibration
+from altijax.drives import imu_of, start_of
 from altijax.motion_intervals import MotionReadings, instants_at
 from altijax.motion_model import MotionNoise, Trajectory
 from altijax.motion_readings import motion_readings

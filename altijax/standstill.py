@@ -45,7 +45,7 @@ def still_samples(readings: ArrayLike, threshold: ArrayLike, window: int = 100) 
     return _moving_sum(jnp.pad(quiet, beside), window) > 0
 
 
-def interval_means(readings: ArrayLike, still: ArrayLike, *, max_intervals: int) -> tuple[jax.Array, jax.Array]:
+def means_at_rest(readings: ArrayLike, still: ArrayLike, *, max_intervals: int) -> tuple[jax.Array, jax.Array]:
     """Mean reading of each still interval of a series, in their order.
 
     Parameters

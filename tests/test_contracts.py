@@ -42,7 +42,18 @@ CORE = [
     "speed_filter",
     "metrics",
 ]
-SIZES = {"time": 7, "knots": 6, "samples": 9, "edges": 8, "wheels": 2, "pulses": 9, "bends": 2, "hills": 2, "pairs": 5, "epochs": 6}
+SIZES = {
+    "time": 7,
+    "knots": 6,
+    "samples": 9,
+    "edges": 8,
+    "wheels": 2,
+    "pulses": 9,
+    "bends": 2,
+    "hills": 2,
+    "pairs": 5,
+    "epochs": 6,
+}
 # Sizes of records that each constructor chooses for itself.
 FREE = {"terms", "legs", "waves", "states"}
 BATCHES = [(), (5,), (2, 5)]

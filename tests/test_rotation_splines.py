@@ -86,7 +86,7 @@ def test_outside_and_at_rest():
     t = np.array([-1.0, 0.5, 2.0, 9.0])
     assert np.isfinite(jax.jacrev(lambda C: rotation_spline(t, t_knots, C)[1])(C_knots)).all()
     moving = tumbling(t_knots).as_matrix()
-    C, w = rotation_spline(t, t_knots, moving)
+    C, w = map(np.asarray, rotation_spline(t, t_knots, moving))
     np.testing.assert_allclose(C[[0, 3]], moving[[0, 3]], atol=1e-13)
     assert not w[[0, 3]].any()
 

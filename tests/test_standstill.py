@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from altijax.standstill import interval_means, still_samples
+from altijax.standstill import means_at_rest, still_samples
 
 
 def turned_by_hand() -> tuple[np.ndarray, np.ndarray]:
@@ -29,12 +29,12 @@ def test_rests_are_found_to_the_sample() -> None:
 
 def test_means_of_intervals() -> None:
     readings, resting = turned_by_hand()
-    mean, samples = interval_means(readings, resting, max_intervals=7)
+    mean, samples = means_at_rest(readings, resting, max_intervals=7)
     np.testing.assert_array_equal(samples, [300, 300, 300, 300, 300, 0, 0])
     for i in range(5):
         np.testing.assert_allclose(mean[i], readings[500 * i + 200 : 500 * i + 500].mean(0), atol=1e-12)
     np.testing.assert_array_equal(mean[5:], 0)
-    few = interval_means(readings, resting, max_intervals=2)
+    few = means_at_rest(readings, resting, max_intervals=2)
     np.testing.assert_array_equal(few[0], mean[:2])
 
 
