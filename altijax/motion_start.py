@@ -48,7 +48,9 @@ def window_attitudes(
     intervals = intervals_between(readings, t, steps)
     v = jax.vmap(_joined, in_axes=(None, 1, 1), out_axes=1)(t, readings.v_gnss, readings.std)
     v_middle = 0.5 * (v[1:] + v[:-1])
-    whole = intervals.duration > 0.3 * readings.spacing
+    # Before the first and after the last measured velocity nothing is known of the acceleration.
+    between = (readings.delayed[1:] > 0) & (readings.delayed[:-1] > 0)
+    whole = between & (intervals.duration > 0.3 * readings.spacing)
     dt = jnp.where(whole, intervals.duration, 1)
     f_n = jnp.diff(v, axis=0) / dt[:, None] + jnp.array([0.0, 0.0, 1.0]) * readings.gravity
     std = jnp.where(whole & (intervals.gap == 0), _ACCELERATION_STD / jnp.sqrt(dt), jnp.inf)
