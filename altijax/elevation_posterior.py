@@ -129,7 +129,7 @@ def elevation_posterior(
     for step in range(_LINEARISATIONS):
         system, found = _linearised(drive, constants, mean, method, known, fixed or {}, knots)
         if step == 0:
-            noise = _likely_noise(system, base)
+            noise = _likely_noise(system, noise, base)
         state, state_covariance, _ = _update(system, noise, base)
         state = np.asarray(state)
         mean = constants.mean + state[: len(names)]
@@ -250,23 +250,21 @@ def _update(system: _System, noise: ElevationNoise, base: str) -> tuple[jax.Arra
 
 @partial(jax.jit, static_argnames="base")
 @partial(jax.value_and_grad, argnums=0)
-def _misfit(logarithms: jax.Array, system: _System, base: str) -> jax.Array:
-    nominal = ElevationNoise()
+def _misfit(logarithms: jax.Array, system: _System, nominal: ElevationNoise, base: str) -> jax.Array:
     levels = {name: getattr(nominal, name) * jnp.exp(x) for name, x in zip(_FITTED, logarithms, strict=True)}
     log_likelihood = _update(system, replace(nominal, **levels), base)[2]
     return 0.5 * jnp.sum((logarithms / _NOISE_SPREAD) ** 2) - log_likelihood
 
 
-def _likely_noise(system: _System, base: str) -> ElevationNoise:
+def _likely_noise(system: _System, nominal: ElevationNoise, base: str) -> ElevationNoise:
     """Levels of largest posterior probability."""
 
     def objective(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = _misfit(jnp.asarray(logarithms), system, base)
+        value, gradient = _misfit(jnp.asarray(logarithms), system, nominal, base)
         return float(value), np.asarray(gradient)
 
     start = np.zeros(len(_FITTED))
     found = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 15, "ftol": 1e-4})
-    nominal = ElevationNoise()
     levels = {name: getattr(nominal, name) * float(np.exp(x)) for name, x in zip(_FITTED, found.x, strict=True)}
     return replace(nominal, **levels)
 

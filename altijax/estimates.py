@@ -109,8 +109,8 @@ def calibrate(
     parameters : str or several
         Names of `PARAMETERS`; the others keep their nominal values.
     method : {"slope", "shirai", "fused"}
-        Method to calibrate. With "fused" the constants begin at their priors, and all other constants and the noise of
-        the drive are found beside them.
+        Method to calibrate. With "fused" the constants begin at their priors, and the noise of the drive is found
+        beside them.
     until : float, optional
         Last time, on the recordings' time axis, whose reference may be used; all of it by default. Afterwards the
         reference only measures what the calibration is worth there (``held_out``).
@@ -281,15 +281,20 @@ def _calibrate_fused(
     calibration = None
     for drive, (t, heights), n in zip(drives, references, fitted, strict=True):
         constants = after(drive, calibration, (t[:n], heights[:n])).constants
-        pick = [constants.names.index(name) for name in names]
-        covariance = constants.covariance[np.ix_(pick, pick)]
+        # Each drive has its own vertical speed at the start; the other constants are nominal in the calibration.
+        others = [x for x in constants.names if x not in (*names, "initial_vertical_speed")]
+        pick, rest = ([constants.names.index(x) for x in group] for group in (names, others))
+        across = constants.covariance[np.ix_(rest, pick)]
+        absorbed = np.linalg.solve(constants.covariance[np.ix_(rest, rest)], across).T
+        nominal = np.array([NOMINAL[name] for name in others])
+        covariance = constants.covariance[np.ix_(pick, pick)] - absorbed @ across
         std = np.sqrt(np.diag(covariance))
         calibration = Calibration(
             method="fused",
-            values=pd.Series(constants.mean[pick], names, name="value"),
+            values=pd.Series(constants.mean[pick] + absorbed @ (nominal - constants.mean[rest]), names, name="value"),
             std=pd.Series(std, names, name="std"),
             correlation=pd.DataFrame(covariance / np.outer(std, std), names, names),
-            absorbed=pd.DataFrame(index=pd.Index(names)),
+            absorbed=pd.DataFrame(absorbed, names, others),
             held_out=pd.DataFrame(),
         )
     assert calibration is not None  # there is at least one drive

@@ -44,8 +44,11 @@ def _motion(slopes: jax.Array, lengths: jax.Array, phases: jax.Array, bend: jax.
     return ideal_readings(partial(road_pose, road, profile), t, STANDARD_GRAVITY)
 
 
-def simulated_drive(seed: int) -> Recording:
-    """One drive of 100 s with a stop in it; IMU and wheels 20 Hz, heights 5 Hz."""
+def simulated_drive(seed: int, car: str = "presumed") -> Recording:
+    """One drive of 100 s with a stop in it; IMU and wheels 20 Hz, heights 5 Hz.
+
+    The car's errors are drawn from what the estimator presumes, or are of a "strange" car, which it does not know.
+    """
     rng = np.random.default_rng(seed)
     hills = 4
     truth = _motion(
@@ -58,12 +61,10 @@ def simulated_drive(seed: int) -> Recording:
     constants = {name: NOMINAL[name] + std * rng.normal() for name, std in SPREAD.items()}
     f = np.array(truth.f_b)
     speed, yaw_rate = np.asarray(truth.speed), np.asarray(truth.w_b[:, 2])
-    # The car, whose errors are those that the estimator presumes, at a level of its own.
-    noise, level = ElevationNoise(), np.exp(0.5 * rng.normal())
     f[:, 0] *= 1 + constants["weight_transfer"]
-    f[:, 0] += level * noise.trim * _lasting(rng, f.shape[0], noise.trim_time)
-    way = np.maximum(speed / RATE, 0.05)
-    f[:, 0] += level * noise.slope * STANDARD_GRAVITY * rng.normal(size=way.size) / np.sqrt(way)
+    noise = ElevationNoise()
+    add_error = {"presumed": _presumed_error, "strange": _strange_error}[car]
+    f[:, 0] += add_error(rng, f[:, 0], speed, np.asarray(truth.position))
     f[:, 2] += noise.rectified * _lasting(rng, f.shape[0], noise.rectified_time)
     f[:, 0] -= constants["lever_arm"] * yaw_rate**2
     mounting = np.asarray(euler_to_matrix(jnp.array([0.0, constants["mounting_pitch"], constants["mounting_yaw"]])))
@@ -80,6 +81,32 @@ def simulated_drive(seed: int) -> Recording:
     wheel = pd.DataFrame({"speed": turning + 0.02 * (turning > 0.1) * rng.normal(size=speed.size)}, index=index)
     reference = pd.DataFrame({"alt": 100 + np.asarray(truth.position[:, 2])}, index=index)
     return Recording(name=f"simulated {seed}", imu=imu, wheel=wheel, reference=reference[::4])
+
+
+def _presumed_error(rng: np.random.Generator, f_x: np.ndarray, speed: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Trim and rough road as `ElevationNoise` has them, at a level of the car's own."""
+    noise, level = ElevationNoise(), np.exp(0.5 * rng.normal())
+    way = np.maximum(speed / RATE, 0.05)
+    rough = noise.slope * STANDARD_GRAVITY * rng.normal(size=way.size) / np.sqrt(way)
+    return level * (noise.trim * _lasting(rng, way.size, noise.trim_time) + rough)
+
+
+def _strange_error(rng: np.random.Generator, f_x: np.ndarray, speed: np.ndarray, position: np.ndarray) -> np.ndarray:
+    """Trim in steps, springs that stick, and a slope of the sensor's that the road's cross-wave repeats.
+
+    The car settles anew about every 20 s (0.2 degrees); its springs follow the load only once it has changed by
+    0.4 m/s^2, then by 5 % of it; and over patches of about 80 m of road it tilts by 0.15 degrees.
+    """
+    steps = np.cumsum(rng.random(f_x.size) < 1 / (20 * RATE))
+    trim = 0.035 * rng.normal(size=steps[-1] + 1)[steps]
+    stuck = np.empty_like(f_x)
+    held = f_x[0]
+    for i, load in enumerate(f_x):
+        held = min(max(held, load - 0.4), load + 0.4)
+        stuck[i] = held - load
+    way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(position, axis=0), axis=1))])
+    patches = 0.025 * rng.normal(size=int(way[-1] / 80) + 2)
+    return trim + 0.05 * stuck + np.interp(way / 80, np.arange(patches.size), patches)
 
 
 def _lasting(rng: np.random.Generator, count: int, time: float) -> np.ndarray:

@@ -28,16 +28,21 @@ def biased(recording: Recording, scale: float = 1.0, **bias: float) -> Recording
 
 @pytest.mark.parametrize("method", estimates.ELEVATION_METHODS)
 def test_ideal_sensors_find_the_elevation(method: str) -> None:
-    """Within what the 1 Hz low pass leaves of starts and stops in 5 s; Shirai's with its remainder (v w_y)^2 / 2g."""
+    """Within what the 1 Hz low pass leaves of starts and stops in 5 s; Shirai's with its remainder (v w_y)^2 / 2g.
+
+    Fused does not know that they are ideal: unlike the others it takes the road for as level as roads are, within its
+    bars, which no later height may narrow to nothing.
+    """
     estimate = estimates.estimate_elevation(EXACT, method=method)
     score = estimates.score_elevation(estimate, EXACT)
     assert score["relief"] > 5
-    assert score["rms"] < {"slope": 0.001, "shirai": 1.0}[method]
+    assert score["rms"] < {"slope": 0.001, "shirai": 1.0, "fused": 2.0}[method]
     assert list(estimate.columns) == COLUMNS
     assert estimate.index.equals(EXACT.imu.index)
     assert np.isfinite(estimate.drop(columns="valid").to_numpy()).all()
     assert estimate["valid"].all() and estimate["elevation"].iloc[0] == 0
-    assert (estimate["elevation_std"].diff().dropna() > -0.05).all()
+    if method != "fused":  # which looks back from the end
+        assert (estimate["elevation_std"].diff().dropna() > -0.05).all()
     assert (estimate["horizontal"] <= estimate["way"] + 1e-9).all()
 
 
@@ -191,7 +196,7 @@ def test_a_calibration_reads_as_a_table() -> None:
     [
         (
             lambda: estimates.estimate_elevation(EXACT, method="shiray"),
-            "method must be one of shirai, slope, got 'shiray'",
+            "method must be one of shirai, slope, fused, got 'shiray'",
         ),
         (
             lambda: estimates.estimate_elevation(dataclasses.replace(EXACT, wheel=None, gnss=None)),

@@ -36,6 +36,7 @@ class Case:
 # The first third of each drive, which the pictures show.
 _SHARES = (20.0, 110.0)
 _NORM = ("accelerometer_bias_z", "initial_vertical_speed")
+_CAR = ("accelerometer_bias_x", "weight_transfer")
 CASES = [
     Case("comma2k19-example", "slope", (), None),
     Case("comma2k19-example", "slope", ("accelerometer_bias_x",), 20.0, bound="1.6"),
@@ -43,12 +44,14 @@ CASES = [
     Case("comma2k19-example", "shirai", (), None),
     Case("comma2k19-example", "shirai", _NORM, 20.0),
     Case("comma2k19-example", "shirai", _NORM, None, bound="0.2"),
+    Case("comma2k19-example", "fused", _CAR, 20.0),
     Case("rtk-drive", "slope", (), None),
     Case("rtk-drive", "slope", ("accelerometer_bias_x",), 110.0),
     Case("rtk-drive", "slope", ("accelerometer_bias_x",), None, bound="1"),
     Case("rtk-drive", "shirai", (), None),
     Case("rtk-drive", "shirai", _NORM, 110.0),
     Case("rtk-drive", "shirai", _NORM, None),
+    Case("rtk-drive", "fused", _CAR, 110.0),
     *(
         Case(drive, method, (), fitted, known="first")
         for drive, fitted in (("comma2k19-example", 20.0), ("rtk-drive", 110.0))
