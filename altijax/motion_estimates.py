@@ -35,6 +35,10 @@ _DELAYS_WITHOUT_GYRO = (0.05, 0.35, 0.65)
 # Standard deviations before anything is known: attitude and velocity can be anything.
 _ATTITUDE_STD, _VELOCITY_STD = 2.0, 100.0
 _ACCELEROMETER_BIAS_STD, _GYRO_BIAS_STD, _GYRO_SCALE_STD = 0.05, 0.07, 0.03
+# The accelerometer's scale acts mostly as a bias along gravity.
+_ACCELEROMETER_SCALE_STD = 0.015
+# What no record tells: the IMU's axes are at right angles, and those of both sensors the body's, to so many radians.
+_AXES_STD = 0.01
 _RATE_STD = 0.3  # of the vehicle's own turning, without a gyro, rad/s
 _MOUNT_STD, _WIND_STD = 0.1, 10.0
 # The course is trusted to so many radians where the epoch alone must do.
@@ -138,9 +142,15 @@ def _window_estimate(recording: Recording, method: str, use_gyro: bool, delay: f
     trajectory, attitude, _ = _windows(readings, delay, 2.0 if use_gyro else _COURSE_STD, steps, window, use_gyro)
     covariance = np.zeros((len(attitude), 6, 6))
     covariance[:, :3, :3] = np.asarray(attitude)
-    velocity = np.asarray(readings.std)
-    covariance[:, 3:, 3:] = np.where(np.isfinite(velocity), velocity, _VELOCITY_STD)[..., None] ** 2 * np.eye(3)
     noise = replace(_WITH_GYRO if use_gyro else _WITHOUT_GYRO, acceleration=0.3)
+    instants = np.asarray(instants_at(readings, jnp.asarray(np.float64(delay))))
+    for axis, std in enumerate(np.asarray(readings.std).T):
+        known = np.isfinite(std)
+        velocity = np.full(std.shape, _VELOCITY_STD)
+        if known.any():
+            away = np.abs(instants[:, None] - instants[known]).min(1)
+            velocity = np.interp(instants, instants[known], std[known]) + 0.3 * away
+        covariance[:, 3 + axis, 3 + axis] = velocity**2
     estimate = _at_samples(recording, readings, trajectory, covariance, noise, delay, steps)
     estimate.attrs = {"delay": delay}
     return estimate
@@ -154,9 +164,12 @@ def _batch_estimate(recording: Recording, use_gyro: bool, wind: bool | str, dela
     batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first)
     batch = _most_probable(readings, batch, steps, estimate_delay=delay is None)
     if wind == "auto" and not use_gyro and _turns_around(readings):
-        std = batch.prior.std.at[16:].set(_WIND_STD)
+        covariance = batch.prior.covariance.at[[16, 17], [16, 17]].set(_WIND_STD**2)
         windy = _most_probable(
-            readings, replace(batch, prior=replace(batch.prior, std=std)), steps, estimate_delay=delay is None
+            readings,
+            replace(batch, prior=replace(batch.prior, covariance=covariance)),
+            steps,
+            estimate_delay=delay is None,
         )
         vector = np.asarray(windy.fit.trajectory.constants)[4:]
         error = np.sqrt(np.diag(np.asarray(windy.fit.covariance)[-1])[16:])
@@ -181,13 +194,18 @@ def _first_batch(
     constants += [_WIND_STD if wind is True else 0.0] * 2
     std = [_ATTITUDE_STD] * 3 + [_VELOCITY_STD] * 3 + [_ACCELEROMETER_BIAS_STD] * 3
     std += [_GYRO_BIAS_STD if use_gyro else _RATE_STD] * 3 + constants
+    covariance = np.diag(np.square(std))
+    force = imu_of(recording)[["ax", "ay", "az"]].to_numpy(float).mean(0)
+    covariance[6:9, 6:9] += _ACCELEROMETER_SCALE_STD**2 * np.outer(force, force)
     delays = _DELAYS_WITHOUT_GYRO if delay is None and not use_gyro else (first,)
     turns = (0.0, 0.5, 1.0, 1.5) if use_gyro else (0.0,)
     best: tuple[_Batch, MotionReadings, int] | None = None
     for trial in delays:
         readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=trial)
         prior = MotionPrior(
-            std=jnp.asarray(std), doubt=jnp.ones_like(readings.std), course=jnp.asarray(1.0 if course else 0.0)
+            covariance=jnp.asarray(covariance),
+            doubt=jnp.ones_like(readings.std),
+            course=jnp.asarray(1.0 if course else 0.0),
         )
         window = _odd(_WINDOW / float(readings.spacing)) if use_gyro else 1
         start, _, _ = _windows(readings, trial, 2.0 if use_gyro else _COURSE_STD, steps, window, use_gyro)
@@ -207,7 +225,7 @@ def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estim
     prior, noise, delay = batch.prior, batch.noise, batch.delay
     trajectory = batch.fit.trajectory
     names = [name for name in _LEVELS if name != "course" or float(prior.course) > 0]
-    start = _WITH_GYRO if float(prior.std[12]) > 0 else _WITHOUT_GYRO
+    start = _WITH_GYRO if float(prior.covariance[12, 12]) > 0 else _WITHOUT_GYRO
     nominal = np.append(np.log([float(getattr(start, name)) for name in names]), _DELAY)
     spread = np.append([_WALK_SPREAD if name in _WALKS else _SPREAD for name in names], _DELAY_STD)
     objective = np.inf
@@ -333,7 +351,7 @@ def _summary(readings: MotionReadings, batch: _Batch) -> dict[str, object]:
         "noise": {name: float(getattr(batch.noise, name)) for name in _LEVELS},
         "nis": float(np.mean(surprise**2)),
         "outliers": int(np.sum(np.asarray(batch.prior.doubt)[there] > 1)),
-        "wind": constants[4:].tolist() if float(batch.prior.std[16]) > 0 else None,
+        "wind": constants[4:].tolist() if float(batch.prior.covariance[16, 16]) > 0 else None,
         "gyro_scale": (1 / (1 + constants[:3])).tolist(),
         "accelerometer_bias": np.asarray(batch.fit.trajectory.accelerometer_bias).mean(0).tolist(),
         "gyro_bias": np.asarray(batch.fit.trajectory.gyro_bias).mean(0).tolist(),
@@ -378,7 +396,7 @@ def _at_samples(
     bridge = s * (1 - s) * dt
     rotation, acceleration = (float(np.asarray(level)) ** 2 for level in (noise.rotation, noise.acceleration))
     force = np.linalg.norm(gained[np.flatnonzero(distinct)[k]], axis=-1) / dt
-    attitude = P[:, :3, :3] + (rotation * bridge)[:, None, None] * np.eye(3)
+    attitude = P[:, :3, :3] + (rotation * bridge + _AXES_STD**2)[:, None, None] * np.eye(3)
     velocity = np.diagonal(P, axis1=1, axis2=2)[:, 3:6] + (acceleration * bridge)[:, None]
     velocity = velocity + (rotation * bridge * (force * dt) ** 2 / 12)[:, None]
 

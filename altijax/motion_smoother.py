@@ -31,11 +31,11 @@ _LONGEST_TURN = 0.7
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, kw_only=True)
 class MotionPrior:
-    """Standard deviations of the first instant and of the constants, and the trust in each measurement.
+    """What is believed of the first instant and of the constants, and the trust in each measurement.
 
     Attributes
     ----------
-    std : (18,)
+    covariance : (18, 18)
         Of the states; zero for those that do not exist.
     doubt : (time, 3)
         Factor on the variance of each velocity, 1 but for outliers.
@@ -43,7 +43,7 @@ class MotionPrior:
         1 where body x is held near the direction of travel, 0 where not.
     """
 
-    std: jax.Array
+    covariance: jax.Array
     doubt: jax.Array
     course: jax.Array
 
@@ -200,7 +200,7 @@ def _linearised(
     # Constants and biases are believed to be zero before the first measurement; attitude and velocity can be anything.
     first = jnp.concatenate([trajectory.accelerometer_bias[0], trajectory.gyro_bias[0], trajectory.constants])
     x0 = jnp.zeros(STATES, t.dtype).at[6:].set(-first)
-    return {"F": F, "c": c, "Q": Q, "z": z, "H": H, "R": R, "x0": x0, "P0": jnp.diag(prior.std**2)}
+    return {"F": F, "c": c, "Q": Q, "z": z, "H": H, "R": R, "x0": x0, "P0": prior.covariance}
 
 
 def _against_all_others(

@@ -38,7 +38,7 @@ def window_attitudes(
     Returns
     -------
     trajectory : Trajectory
-        Attitudes, and the measured velocities joined by straight lines; biases are zero.
+        Attitudes, and the measured velocities joined by straight lines, led on by the readings; biases are zero.
     covariance : (time, 3, 3) rad^2
         Of the attitude, a rotation vector in navigation axes.
     misfit : ()
@@ -68,8 +68,14 @@ def window_attitudes(
         f_b, f_n, C0, jnp.full_like(dt, prior_std), std, window=window, C_gyro=begins @ half if gyro else None
     )
     zero = jnp.zeros_like(v)
+    C_nb = _at_instants(t, shared.C_nb, half, C[:, -1], gyro=gyro)
+    # Beyond the measured velocities the readings lead on.
+    gained = jnp.einsum("kij,kj->ki", shared.C_nb, f_b) - jnp.array([0.0, 0.0, 1.0]) * readings.gravity
+    beyond = jnp.cumsum(jnp.where(between[:, None], 0, gained * intervals.duration[:, None]), 0)
+    beyond = jnp.concatenate([zero[:1], beyond])
+    v = v + beyond - beyond[jnp.argmax(jnp.isfinite(readings.std[:, 0]))]
     trajectory = Trajectory(
-        C_nb=_at_instants(t, shared.C_nb, half, C[:, -1], gyro=gyro),
+        C_nb=C_nb,
         v_n=v,
         accelerometer_bias=zero,
         gyro_bias=zero,

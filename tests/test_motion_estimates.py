@@ -26,7 +26,7 @@ def flight() -> Recording:
     """A minute of turns in a wind, a biased IMU at 50 Hz from t = 5 s, and late GNSS at 1 Hz that ends early."""
     one = jnp.ones(1)
     road = winding_road(1.2 * one, 250.0 * one, 0 * one, 0.05 * one, 300.0 * one, 0 * one, 0.0)
-    pose = partial(flight_pose, road, rest_to_rest(2000.0, 20.0, 10.0), jnp.array([6.0, -4.0, 0.0]), 9.80665)
+    pose = partial(flight_pose, road, rest_to_rest(2000.0, 100.0, 10.0), jnp.array([6.0, -4.0, 0.0]), 9.80665)
     t = np.arange(0, 60, 0.02)
     truth = jax.jit(partial(ideal_readings, pose))(jnp.asarray(t + 15.0), 9.80665)
     rng = np.random.default_rng(7)

@@ -34,4 +34,4 @@ def test_stated_accuracies_are_used_and_missing_ones_filled() -> None:
 
 def test_streams_that_do_not_meet_are_named() -> None:
     with pytest.raises(ValueError, match="'made': 2 GNSS velocities lie within"):
-        motion_readings(made(), use_gyro=True, delay=-8.5)
+        motion_readings(made(), use_gyro=True, delay=-10.5)

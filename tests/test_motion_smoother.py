@@ -50,17 +50,28 @@ def simulated(seed: int) -> tuple[MotionReadings, int, np.ndarray]:
 
 
 @partial(jax.jit, static_argnames="steps")
-def run(readings: MotionReadings, trajectory: Trajectory, noise: MotionNoise, delay: jax.Array, steps: int) -> tuple:
-    prior = MotionPrior(std=jnp.array(STD), doubt=jnp.ones_like(readings.std), course=jnp.zeros(()))
+def run(
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    noise: MotionNoise,
+    delay: jax.Array,
+    steps: int,
+    doubt: jax.Array | float = 1.0,
+) -> tuple:
+    doubt = jnp.broadcast_to(jnp.asarray(doubt, readings.std.dtype), readings.std.shape)
+    prior = MotionPrior(covariance=jnp.diag(jnp.array(STD) ** 2), doubt=doubt, course=jnp.zeros(()))
     return motion_pass(readings, trajectory, prior, noise, delay, steps)
 
 
 def solved(readings: MotionReadings, steps: int) -> tuple:
     trajectory, _, _ = start(readings, steps)
     noise = jax.tree.map(jnp.asarray, NOISE)
-    for _ in range(6):
-        fit = run(readings, trajectory, noise, jnp.zeros(()), steps)
+    doubt = jnp.ones_like(readings.std)
+    for k in range(12):
+        fit = run(readings, trajectory, noise, jnp.zeros(()), steps, doubt)
         trajectory = fit.trajectory
+        # Doubts begin where the passes have come near.
+        doubt = fit.doubt if k > 4 else doubt
     return fit, noise
 
 
@@ -76,14 +87,15 @@ def test_windows_come_near_and_passes_end() -> None:
     fit, _ = solved(readings, steps)
     before = np.linalg.norm(matrix_to_rotvec(trajectory.C_nb @ np.swapaxes(C, -1, -2)), axis=-1)
     after = np.linalg.norm(matrix_to_rotvec(fit.trajectory.C_nb @ np.swapaxes(C, -1, -2)), axis=-1)
-    assert before.max() < 0.5 and after.max() < 0.06
+    seen = np.isfinite(np.asarray(readings.std)[:, 0])
+    assert before[seen].max() < 0.5 and after.max() < 0.06
     assert float(fit.step) < 1e-6
 
 
 def test_errors_have_the_size_of_their_bars() -> None:
     """Normalised errors squared of attitude, velocity and biases in mid-record, over simulated records: 12 each."""
     squares = []
-    for seed in range(12):
+    for seed in range(8):
         readings, steps, bias = simulated(seed)
         fit, _ = solved(readings, steps)
         t = np.asarray(instants_at(readings, jnp.zeros(())))
@@ -96,8 +108,8 @@ def test_errors_have_the_size_of_their_bars() -> None:
             bias[3:] - np.asarray(fit.trajectory.gyro_bias)[k],
         ]
         squares.append(error @ np.linalg.solve(np.asarray(fit.covariance)[k][:12, :12], error))
-    # The mean of 12 chi-squares of 12 degrees has a standard deviation of 1.4.
-    assert 7.8 < np.mean(squares) < 16.2, squares
+    # The mean of 8 chi-squares of 12 degrees has a standard deviation of 1.7.
+    assert 6.9 < np.mean(squares) < 17.1, squares
 
 
 def test_the_likelihood_has_its_gradient() -> None:
@@ -106,9 +118,9 @@ def test_the_likelihood_has_its_gradient() -> None:
     trajectory, h = fit.trajectory, 1e-5
 
     def at(noise: MotionNoise, delay: float) -> float:
-        return float(run(readings, trajectory, noise, jnp.asarray(delay), steps).log_likelihood)
+        return float(run(readings, trajectory, noise, jnp.asarray(delay), steps, 1.0).log_likelihood)
 
-    fit = run(readings, trajectory, noise, jnp.zeros(()), steps)
+    fit = run(readings, trajectory, noise, jnp.zeros(()), steps, 1.0)
     by_delay = (at(noise, h) - at(noise, -h)) / (2 * h)
     assert float(fit.by_delay) == pytest.approx(by_delay, rel=1e-4, abs=1e-3)
     for name in ("rotation", "acceleration", "horizontal", "vertical"):
