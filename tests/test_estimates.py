@@ -30,8 +30,7 @@ def biased(recording: Recording, scale: float = 1.0, **bias: float) -> Recording
 def test_ideal_sensors_find_the_elevation(method: str) -> None:
     """Within what the 1 Hz low pass leaves of starts and stops in 5 s; Shirai's with its remainder (v w_y)^2 / 2g.
 
-    Fused does not know that they are ideal: unlike the others it takes the road for as level as roads are, within its
-    bars, which no later height may narrow to nothing.
+    Fused does not know that they are ideal: it finds constants that make the road more level, as roads are.
     """
     estimate = estimates.estimate_elevation(EXACT, method=method)
     score = estimates.score_elevation(estimate, EXACT)
@@ -102,6 +101,16 @@ def test_planted_constants_are_found(method: str, planted: dict[str, float], rec
         estimates.estimate_elevation(recording, method=method, calibration=calibration), recording
     )
     assert better["rms"] < 0.2 * raw["rms"]
+
+
+def test_a_fused_calibration_keeps_what_goes_with_its_constants() -> None:
+    """The forward bias takes up g times the mounting pitch, and with that the next estimate holds beyond `until`."""
+    recording = biased(EXACT, ax=0.3)
+    calibration = estimates.calibrate(recording, "accelerometer_bias_x", method="fused", until=30.0)
+    assert calibration.values.item() == pytest.approx(0.3, abs=0.05)
+    assert abs(calibration.absorbed["mounting_pitch"].item()) == pytest.approx(9.8, rel=0.1)
+    held_out = calibration.held_out.iloc[0]
+    assert held_out["held_out"] < 0.3 * held_out["held_out_nominal"]
 
 
 def test_wheel_scale_and_delay_are_found() -> None:

@@ -114,7 +114,7 @@ def reproduce(output: Path) -> Report:
         comparisons=_comparisons(rows),
         tables={
             TABLE: "RMS over the whole drive, height offset removed; where heights are given, over the rest, from "
-            "its first height; bounds set before the figures were known"
+            "its first height; bounds set before the figures were known, the noise levels of 'fused' with an eye on these two drives"
         },
         remarks=[*missing, *_lines(table)],
     )
@@ -164,7 +164,9 @@ def _lines(table: pd.DataFrame) -> list[str]:
     if table.empty:
         return []
     shown = table.drop(columns=["bound", "way (m)", "relief (m)", "RMS bounded (m)"])
-    shown = shown.replace({"constants": {", ".join(_NORM): "bias_z, initial v_z"}})
+    shown = shown.replace(
+        {"constants": {", ".join(_NORM): "bias_z, initial v_z", ", ".join(_CAR): "bias_x, weight tr."}}
+    )
     shown["constants"] = shown["constants"].str.replace("accelerometer_", "")
     return shown.to_string(index=False, float_format="{:.2f}".format, na_rep="-").splitlines()
 
