@@ -164,10 +164,10 @@ def _batch_estimate(recording: Recording, use_gyro: bool, wind: bool | str, dela
     batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first)
     batch = _most_probable(readings, batch, steps, estimate_delay=delay is None)
     if wind == "auto" and not use_gyro and _turns_around(readings):
-        covariance = batch.prior.covariance.at[[16, 17], [16, 17]].set(_WIND_STD**2)
+        with_wind = batch.prior.covariance.at[[16, 17], [16, 17]].set(_WIND_STD**2)
         windy = _most_probable(
             readings,
-            replace(batch, prior=replace(batch.prior, covariance=covariance)),
+            replace(batch, prior=replace(batch.prior, covariance=with_wind)),
             steps,
             estimate_delay=delay is None,
         )
