@@ -114,7 +114,8 @@ def reproduce(output: Path) -> Report:
         comparisons=_comparisons(rows),
         tables={
             TABLE: "RMS over the whole drive, height offset removed; where heights are given, over the rest, from "
-            "its first height; bounds set before the figures were known, the noise levels of 'fused' with an eye on these two drives"
+            "its first height; bounds set before the figures were "
+            "known, the noise levels of 'fused' with an eye on these two drives"
         },
         remarks=[*missing, *_lines(table)],
     )
@@ -172,10 +173,12 @@ def _lines(table: pd.DataFrame) -> list[str]:
 
 
 def _draw(estimates: dict[str, pd.DataFrame], recording: Recording, path: Path) -> None:
-    figure, axes = plt.subplots(2, 1, figsize=(8, 7), layout="constrained")
+    figure, axes = plt.subplots(2, 1, figsize=(13, 7), layout="constrained")
     fitted = next(case.fitted for case in CASES if case.drive == recording.name and case.fitted in _SHARES)
     plot_elevation(estimates, recording, ax=axes[0])
     axes[0].set_title(f"{recording.name}: elevation, constants fitted on its first {fitted:g} s")
     plot_elevation_error(estimates, recording, fitted_until=_start(recording) + fitted, ax=axes[1])
+    for ax in axes:
+        ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))  # beside the curves, which fill the axes
     figure.savefig(path, dpi=120)
     plt.close(figure)
