@@ -22,7 +22,8 @@ class Delay:
     delay : () s
         What to take off the stamps of the GNSS velocities; negative where they are early.
     std : () s
-        Its standard deviation, from the misfit left and its correlation in time.
+        Its standard deviation, from the misfit left and its correlation in time; at most that of a delay which may lie
+        anywhere in the range considered.
     correlation : ()
         Between the accelerations by both sensors at that delay.
     ambiguous : ()
@@ -110,7 +111,9 @@ def estimate_delay(t: ArrayLike, a: ArrayLike, t_gnss: ArrayLike, v_gnss: ArrayL
     left, by_delay = _linearised(measured, shifted(delay), slope(delay))
     curvature = jnp.sum(by_delay**2)
     gradient_var = _long_run_variance(jnp.sum(left * by_delay, 0), _MEMORY / (t_gnss[-1] - t_gnss[0]))
-    std = jnp.where(curvature > 0, _ratio(_safe.sqrt(gradient_var), curvature), jnp.inf)
+    # Not known at all, it is somewhere in the range.
+    widest = max_delay / 3**0.5
+    std = jnp.minimum(jnp.where(curvature > 0, _ratio(_safe.sqrt(gradient_var), curvature), widest), widest)
 
     # Another peak is as good where its misfit is larger by less than three standard deviations would make it, in units
     # of a variance that counts the correlation in time; or where the grid, which may miss the top of a peak by a

@@ -52,7 +52,8 @@ SIZES = {
     "bends": 2,
     "hills": 2,
     "pairs": 5,
-    "epochs": 6,
+    "epochs": 9,
+    "components": 2,
 }
 # Sizes of records that each constructor chooses for itself.
 FREE = {"terms", "legs", "waves", "states"}
@@ -123,10 +124,8 @@ def example(entry: Entry, batch: tuple[int, ...], dtype: type, seed: int) -> obj
         values = np.array([0.7, 0.2, 100.0]) + np.array([1e-3, 1e-3, 10.0]) * rng.standard_normal(shape)
     elif name == "ecef":
         values = np.array([4.2e6, 1.7e6, 4.5e6]) + 1e3 * rng.standard_normal(shape)
-    elif name in ("speed", "cutoff", "dt", "max_gap", "way"):
-        values = {"speed": 10.0, "cutoff": 2.0, "dt": 0.1, "max_gap": 0.25, "way": 10.0}[name] + rng.random(
-            shape
-        ) * 0.01
+    elif name in POSITIVE:
+        values = POSITIVE[name] + 0.01 * rng.random(shape)
     else:
         values = 0.4 * rng.standard_normal(shape)
     return jnp.asarray(values, dtype)

@@ -51,7 +51,7 @@ def test_what_does_not_tell_the_delay_is_flagged():
     found = estimate_delay(t, np.cos(wave * t)[None], t[::5], np.sin(wave * (t[::5] - TRUE))[None] / wave)
     assert found.ambiguous
     still = estimate_delay(t, 0 * a[0], t_gnss, 0 * v[0])
-    assert still.ambiguous and np.isfinite(still.delay) and np.isinf(still.std)
+    assert still.ambiguous and np.isfinite(still.delay) and still.std > 0.5
 
 
 def test_missing_velocities_and_wrong_scale_do_not_matter_much():

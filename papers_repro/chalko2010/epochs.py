@@ -75,7 +75,7 @@ def epochs_of_arrays(
     middle = (t_knots[1:] + t_knots[:-1]) / 2
     turned_middle = interpolate_rotations(middle, t, turned)
     both = jnp.concatenate([f_b, jnp.einsum("tij,tj->ti", turned, f_b)], -1)
-    f_b_mean, in_first = jnp.split(interval_means(t, both, t_knots), 2, -1)
+    f_b_mean, in_first = jnp.split(detrended_means(t, both, t_knots), 2, -1)
     a_n = jnp.diff(v_knots, axis=0) / jnp.diff(t_knots)[:, None]
     _, cog, _ = velocity_to_course((v_knots[1:] + v_knots[:-1]) / 2)
     zero = jnp.zeros_like(cog)
@@ -94,7 +94,7 @@ def epochs_of_arrays(
     )
 
 
-def interval_means(t: jax.Array, values: jax.Array, edges: jax.Array) -> jax.Array:
+def detrended_means(t: jax.Array, values: jax.Array, edges: jax.Array) -> jax.Array:
     """Fourier interval means of series (time, 3), whose ends are first made to meet by taking a straight line off."""
     slope = (values[-1] - values[0]) / (t[-1] - t[0])
     line = values[0] + (t - t[0])[:, None] * slope
