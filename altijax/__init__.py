@@ -53,12 +53,6 @@ References
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from altijax.allan import (
-    AllanFit,
-    allan_deviation,
-    averaging_factors,
-    fit_allan,
-)
 from altijax.altitude import (
     elevation_by_norm,
     elevation_by_slope,
@@ -73,6 +67,33 @@ from altijax.attitude import (
     fit_attitude,
     fit_attitudes,
     hold_attitudes,
+)
+from altijax.calibration.allan import (
+    AllanFit,
+    allan_deviation,
+    averaging_factors,
+    fit_allan,
+)
+from altijax.calibration.identifiability import (
+    Identification,
+    describe_undetermined,
+    identify,
+    information_gain,
+)
+from altijax.calibration.serial_correlation import (
+    mean_with_std,
+    statistical_inefficiency,
+)
+from altijax.calibration.standstill import (
+    means_at_rest,
+    still_samples,
+)
+from altijax.calibration.static import (
+    SensorFit,
+    fit_accelerometer_positions,
+    fit_accelerometer_temperature,
+    fit_gyro_at_rest,
+    fit_gyro_temperature,
 )
 from altijax.delays import (
     Delay,
@@ -91,12 +112,6 @@ from altijax.earth import (
     geodetic_to_ecef,
     geodetic_to_enu,
     normal_gravity,
-)
-from altijax.identifiability import (
-    Identification,
-    describe_undetermined,
-    identify,
-    information_gain,
 )
 from altijax.instruments import (
     DOPPLER_1_HZ,
@@ -162,10 +177,6 @@ from altijax.sensors import (
     gyro_output,
     saturated,
 )
-from altijax.serial_correlation import (
-    mean_with_std,
-    statistical_inefficiency,
-)
 from altijax.signals import (
     cumulative_integral,
     derivative,
@@ -190,24 +201,13 @@ from altijax.speed import (
     speed_with_roll,
     speed_without_roll,
 )
-from altijax.speed_filter import (
+from altijax.speed_estimate.filter import (
     SpeedTrack,
     filter_speed,
 )
-from altijax.speed_model import (
+from altijax.speed_estimate.model import (
     SpeedNoise,
     state_names,
-)
-from altijax.standstill import (
-    means_at_rest,
-    still_samples,
-)
-from altijax.static_calibration import (
-    SensorFit,
-    fit_accelerometer_positions,
-    fit_accelerometer_temperature,
-    fit_gyro_at_rest,
-    fit_gyro_temperature,
 )
 from altijax.strapdown import (
     integrate_attitude,
@@ -233,7 +233,7 @@ from altijax.wheels import (
 )
 
 if TYPE_CHECKING:
-    from altijax.calibrations import (
+    from altijax.calibration.records import (
         Calibration,
     )
     from altijax.datasets import (
@@ -248,12 +248,11 @@ if TYPE_CHECKING:
     from altijax.estimates import (
         calibrate,
         estimate_elevation,
-        score_elevation,
-    )
-    from altijax.motion_estimates import (
         estimate_motion,
-    )
-    from altijax.motion_scores import (
+        estimate_speed,
+        outage_errors,
+        outage_table,
+        score_elevation,
         score_motion,
         withheld_gnss_errors,
     )
@@ -269,13 +268,6 @@ if TYPE_CHECKING:
         describe,
         read_recording,
     )
-    from altijax.speed_estimates import (
-        estimate_speed,
-    )
-    from altijax.speed_outages import (
-        outage_errors,
-        outage_table,
-    )
 
 # Files and tables need pandas, pictures matplotlib: both are imported on first use only.
 _LAZY = {
@@ -289,16 +281,16 @@ _LAZY = {
     "list_datasets": "datasets",
     "load_dataset": "datasets",
     "gravity_at": "drives",
-    "Calibration": "calibrations",
+    "Calibration": "calibration.records",
     "calibrate": "estimates",
     "estimate_elevation": "estimates",
     "score_elevation": "estimates",
-    "estimate_speed": "speed_estimates",
-    "outage_errors": "speed_outages",
-    "outage_table": "speed_outages",
-    "estimate_motion": "motion_estimates",
-    "score_motion": "motion_scores",
-    "withheld_gnss_errors": "motion_scores",
+    "estimate_speed": "estimates",
+    "outage_errors": "estimates",
+    "outage_table": "estimates",
+    "estimate_motion": "estimates",
+    "score_motion": "estimates",
+    "withheld_gnss_errors": "estimates",
     "plot_elevation": "plots",
     "plot_elevation_error": "plots",
     "plot_streams": "plots",

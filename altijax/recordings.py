@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from altijax.log_formats import Log, is_comma2k19, read_comma2k19, read_ulog
-from altijax.stream_checks import (
+from altijax.formats.logs import Log, is_comma2k19, read_comma2k19, read_ulog
+from altijax.formats.stream_checks import (
     RecordingError,
     RecordingWarning,
     axes_to_matrix,
@@ -25,7 +25,7 @@ from altijax.stream_checks import (
     check_together,
     clean_rows,
 )
-from altijax.tidy_folder import (
+from altijax.formats.tidy_folder import (
     QUANTITIES,
     WHEELS,
     check_units,
@@ -33,7 +33,7 @@ from altijax.tidy_folder import (
     read_tidy_folder,
     wheel_from_pulses,
 )
-from altijax.ublox import read_ubx
+from altijax.formats.ublox import read_ubx
 
 _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
 _STREAMS = ("imu", "wheel", "gnss", "reference")

@@ -20,9 +20,9 @@ import numpy as np
 import pandas as pd
 
 import altijax as aj
-from altijax.drive_calibration import calibrate_stretches, drive_stretches
-from altijax.drive_model import DRIVE_PARAMETERS
-from altijax.simulated_drives import Manoeuvres, recorded_drive, town_drive
+from altijax.calibration.drive_model import DRIVE_PARAMETERS
+from altijax.calibration.drives import calibrate_stretches, drive_stretches
+from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, town_drive
 
 GRAVITY, DENSITY = 9.80665, {"gyro": float(aj.MEMS_GYRO.noise_density)}
 DENSITY["accelerometer"] = float(aj.MEMS_ACCELEROMETER.noise_density)

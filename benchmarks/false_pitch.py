@@ -27,7 +27,7 @@ import pandas as pd
 
 import altijax as aj
 from altijax.attitude import fit_attitude
-from altijax.motion_estimates import estimate_motion
+from altijax.motion_estimate.estimates import estimate_motion
 from altijax.strapdown import integrate_attitude
 from altijax.wahba import fit_windows
 

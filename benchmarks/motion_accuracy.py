@@ -28,8 +28,8 @@ import pandas as pd
 from scipy.spatial.transform import Rotation
 
 from altijax.datasets import load_dataset
-from altijax.motion_estimates import estimate_motion
-from altijax.motion_scores import score_motion, withheld_gnss_errors
+from altijax.motion_estimate.estimates import estimate_motion
+from altijax.motion_estimate.scores import score_motion, withheld_gnss_errors
 from altijax.recordings import Recording
 
 ANGLES, VELOCITY = ["roll", "pitch", "heading"], ["v_e", "v_n", "v_u"]

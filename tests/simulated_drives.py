@@ -8,8 +8,8 @@ import numpy as np
 import pandas as pd
 
 from altijax.constants import STANDARD_GRAVITY
-from altijax.elevation_model import NOMINAL, PARAMETERS
-from altijax.elevation_smoother import ElevationNoise
+from altijax.elevation_estimate.model import NOMINAL, PARAMETERS
+from altijax.elevation_estimate.smoother import ElevationNoise
 from altijax.motions import Readings, ideal_readings, road_pose
 from altijax.recordings import Recording
 from altijax.roads import SpeedProfile, winding_road

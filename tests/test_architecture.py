@@ -14,52 +14,63 @@ ROOT = PACKAGE.parent
 
 # Each level may import from the levels before it; modules of one level know nothing of each other.
 LEVELS = [
-    ["constants", "_shapes", "_safe", "_fast_trigonometry"],
-    ["rotations", "signals", "least_squares", "identifiability", "serial_correlation", "standstill", "wahba"],
-    ["_epoch_cost"],
-    ["_epoch_steps"],
-    ["earth", "roads", "smoothing", "delays", "rotation_splines", "preintegration", "state_smoother"],
-    ["motion_model"],
-    ["motion_intervals"],
-    ["motion_smoother", "motion_start"],
+    ["constants", "_shapes", "_safe", "_epoch_fit.trigonometry"],
+    ["rotations", "signals", "least_squares", "wahba"],
+    ["calibration.identifiability", "calibration.serial_correlation", "calibration.standstill"],
+    ["_epoch_fit.cost"],
+    ["_epoch_fit.steps"],
+    ["earth", "roads", "smoothing", "delays", "rotation_splines"],
+    ["motion_estimate.preintegration", "motion_estimate.state_smoother"],
+    ["motion_estimate.model"],
+    ["motion_estimate.intervals"],
+    ["motion_estimate.smoother", "motion_estimate.start"],
     ["motions", "sensors", "wheels", "doppler"],
-    ["allan", "instruments", "static_calibration", "strapdown", "drive_model", "shared_parameters"],
-    ["simulated_drives"],
-    ["attitude", "experiment_design"],
+    ["instruments", "strapdown"],
+    ["calibration.allan", "calibration.static", "calibration.drive_model", "calibration.shared_parameters"],
+    ["calibration.simulated_drives"],
+    ["attitude", "calibration.experiment_design"],
     ["altitude", "speed"],
-    ["speed_model"],
-    ["speed_filter"],
+    ["speed_estimate.model"],
+    ["speed_estimate.filter"],
     ["metrics"],
-    ["stream_checks"],
-    ["tidy_folder", "log_formats"],
-    ["ublox"],
+    ["formats.stream_checks"],
+    ["formats.tidy_folder", "formats.logs"],
+    ["formats.ublox"],
     ["recordings"],
     ["datasets", "drives"],
-    ["motion_readings"],
-    ["elevation_model", "elevation_smoother", "drive_calibration"],
-    ["elevation_posterior"],
-    ["calibrations"],
+    ["motion_estimate.readings", "elevation_estimate.model", "elevation_estimate.smoother", "calibration.drives"],
+    ["elevation_estimate.posterior"],
+    ["calibration.records"],
+    ["elevation_estimate.estimates", "motion_estimate.estimates", "speed_estimate.steps"],
+    ["elevation_estimate.calibration", "motion_estimate.scores", "speed_estimate.estimates"],
+    ["speed_estimate.outages"],
     ["estimates"],
-    ["motion_estimates"],
-    ["motion_scores"],
-    ["speed_steps"],
-    ["speed_estimates"],
-    ["speed_outages"],
     ["plots"],
 ]
 LEVEL = {name: number for number, names in enumerate(LEVELS) for name in names}
 CORE = {name for name in LEVEL if LEVEL[name] <= LEVEL["metrics"]}
-MODULES = sorted(path.stem for path in PACKAGE.glob("*.py") if path.stem != "__init__")
+MODULES = sorted(
+    ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
+    for folder in (PACKAGE, *(path.parent for path in PACKAGE.glob("*/__init__.py")))
+    for path in folder.glob("*.py")
+    if path.stem != "__init__"
+)
+
+FOLDERS = {f"altijax.{module.rpartition('.')[0]}" for module in MODULES if "." in module}
+
+
+def file_of(module: str) -> Path:
+    return PACKAGE.joinpath(*module.split(".")).with_suffix(".py")
 
 
 def imported(path: Path) -> set[str]:
-    """Dotted names a file imports; ``from altijax import x`` counts as altijax.x."""
+    """Dotted names a file imports; ``from altijax.folder import x`` counts as altijax.folder.x."""
     names = set()
     for node in imports_of(path):
         if isinstance(node, ast.Import):
             names |= {alias.name for alias in node.names}
-        elif node.module == "altijax":
-            names |= {f"altijax.{alias.name}" for alias in node.names}
+        elif node.module == "altijax" or node.module in FOLDERS:
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
         elif not isinstance(node, ast.Import):
             assert node.level == 0 and node.module, f"{path.name}: relative import"
             names.add(node.module)
@@ -70,15 +81,16 @@ def test_every_module_has_a_level_and_a_test() -> None:
     assert set(MODULES) == set(LEVEL)
     for module in MODULES:
         if not module.startswith("_") and module != "constants":
-            assert (ROOT / "tests" / f"test_{module}.py").is_file(), module
+            *folder, name = module.split(".")
+            assert (ROOT / "tests" / Path(*folder) / f"test_{name}.py").is_file(), module
 
 
 @pytest.mark.parametrize("module", MODULES)
 def test_imports_go_one_way(module: str) -> None:
-    for name in imported(PACKAGE / f"{module}.py"):
+    for name in imported(file_of(module)):
         package, _, rest = name.partition(".")
         if package == "altijax":
-            assert LEVEL[rest] < LEVEL[module], f"{module} imports {rest}"
+            assert rest in LEVEL and LEVEL[rest] < LEVEL[module], f"{module} imports {rest}"
         elif module in CORE and package not in sys.stdlib_module_names:
             assert package == "jax", f"{module} is core and imports {package}"
 

@@ -23,8 +23,8 @@ CORE = [
     "rotations",
     "signals",
     "least_squares",
-    "serial_correlation",
-    "standstill",
+    "calibration.serial_correlation",
+    "calibration.standstill",
     "wahba",
     "smoothing",
     "delays",
@@ -39,7 +39,7 @@ CORE = [
     "attitude",
     "altitude",
     "speed",
-    "speed_filter",
+    "speed_estimate.filter",
     "metrics",
 ]
 SIZES = {

@@ -1,282 +1,31 @@
-"""The verbs: on a simulated drive whose truth is exact, on damaged copies of it, and on the real drives."""
+"""The verbs have the arguments that their design promises, and answer from the one package as from `estimates`."""
 
-import dataclasses
-from pathlib import Path
+import inspect
 
-import jax
-import jax.numpy as jnp
-import numpy as np
-import pandas as pd
 import pytest
 
+import altijax
 from altijax import estimates
-from altijax.constants import STANDARD_GRAVITY
-from altijax.recordings import Recording, RecordingWarning, read_recording
-from tests.exact import EXACT, exact_drive
-
-COLUMNS = ["elevation", "elevation_std", "way", "horizontal", "vertical_speed", "valid"]
-
-
-def biased(recording: Recording, scale: float = 1.0, **bias: float) -> Recording:
-    """The recording by an IMU with true = measured / scale - bias."""
-    imu = recording.imu.copy()
-    imu[["ax", "ay", "az"]] *= scale
-    for axis, value in bias.items():
-        imu[axis] += scale * value
-    return dataclasses.replace(recording, imu=imu)
-
-
-@pytest.mark.parametrize("method", estimates.ELEVATION_METHODS)
-def test_ideal_sensors_find_the_elevation(method: str) -> None:
-    """Within what the 1 Hz low pass leaves of starts and stops in 5 s; Shirai's with its remainder (v w_y)^2 / 2g.
-
-    Fused does not know that they are ideal: it finds constants that make the road more level, as roads are.
-    """
-    estimate = estimates.estimate_elevation(EXACT, method=method)
-    score = estimates.score_elevation(estimate, EXACT)
-    assert score["relief"] > 5
-    assert score["rms"] < {"slope": 0.001, "shirai": 1.0, "fused": 2.0}[method]
-    assert list(estimate.columns) == COLUMNS
-    assert estimate.index.equals(EXACT.imu.index)
-    assert np.isfinite(estimate.drop(columns="valid").to_numpy()).all()
-    assert estimate["valid"].all() and estimate["elevation"].iloc[0] == 0
-    if method != "fused":  # which looks back from the end
-        assert (estimate["elevation_std"].diff().dropna() > -0.05).all()
-    assert (estimate["horizontal"] <= estimate["way"] + 1e-9).all()
-
-
-def test_shirai_errs_by_its_remainder_and_by_nothing_else() -> None:
-    """On curved hills Eq. (1) is too large by (v w_y)^2 / 2g: twice integrated, that is its whole error."""
-    estimate = estimates.estimate_elevation(EXACT, method="shirai")
-    imu, speed = EXACT.imu, np.interp(EXACT.imu.index, EXACT.wheel.index, EXACT.wheel["speed"])
-    dt = 0.02
-    remainder = (speed * imu["gy"]) ** 2 / (2 * STANDARD_GRAVITY)
-    predicted = np.cumsum(np.cumsum(remainder)) * dt**2
-    truth = np.interp(imu.index, EXACT.reference.index, EXACT.reference["alt"] - EXACT.reference["alt"].iloc[0])
-    np.testing.assert_allclose(estimate["elevation"] - truth, predicted, atol=0.1)
-    assert predicted.iloc[-1] > 0.5
-
-
-def test_estimates_do_not_look_at_the_reference_or_at_gnss_heights() -> None:
-    wrong = EXACT.reference * np.nan
-    gnss = EXACT.gnss.assign(alt=np.linspace(-500, 500, len(EXACT.gnss)), lat=40.0)
-    for method in estimates.ELEVATION_METHODS:
-        with_heights = estimates.estimate_elevation(dataclasses.replace(EXACT, gnss=gnss), method=method)
-        other = dataclasses.replace(EXACT, reference=wrong, gnss=gnss.assign(alt=gnss["alt"].to_numpy()[::-1]))
-        pd.testing.assert_frame_equal(estimates.estimate_elevation(other, method=method), with_heights)
-        none = dataclasses.replace(EXACT, reference=None, gnss=gnss)
-        pd.testing.assert_frame_equal(estimates.estimate_elevation(none, method=method), with_heights)
-
-
-def test_calibration_does_not_look_beyond_until() -> None:
-    later = EXACT.reference.copy()
-    later.loc[later.index > 30.0, "alt"] += np.arange((later.index > 30.0).sum())
-    first = estimates.calibrate(EXACT, "accelerometer_bias_x", method="slope", until=30.0)
-    second = estimates.calibrate(
-        dataclasses.replace(EXACT, reference=later), "accelerometer_bias_x", method="slope", until=30.0
-    )
-    pd.testing.assert_series_equal(first.values, second.values)
-    pd.testing.assert_series_equal(first.std, second.std)
-    assert first.held_out["until"].item() == 30.0
-    assert second.held_out["held_out"].item() > 1
 
 
 @pytest.mark.parametrize(
-    ("method", "planted", "recording"),
+    ("verb", "arguments"),
     [
-        ("slope", {"accelerometer_bias_x": 0.3}, biased(EXACT, ax=0.3)),
-        ("slope", {"accelerometer_bias_x": -0.2, "accelerometer_scale_x": 1.02}, biased(EXACT, 1.02, ax=-0.2)),
-        ("shirai", {"accelerometer_bias_z": 0.1, "initial_vertical_speed": 0.0}, biased(EXACT, az=0.1)),
-        ("shirai", {"accelerometer_scale": 1.01}, biased(EXACT, 1.01)),
+        ("estimate_elevation", ("method", "calibration", "initial_vertical_speed", "known_heights")),
+        (
+            "estimate_speed",
+            ("method", "aid_until", "calibration", "initial_speed", "initial_pitch", "sensors"),
+        ),
+        ("estimate_motion", ("method", "calibration", "use_gyro", "wind", "delay")),
+        ("calibrate", ("method", "until")),
     ],
 )
-def test_planted_constants_are_found(method: str, planted: dict[str, float], recording: Recording) -> None:
-    calibration = estimates.calibrate(recording, list(planted), method=method)
-    # Shirai's remainder and the low pass shift the constants of exact data by this much
-    for name, value in planted.items():
-        assert calibration.values[name] == pytest.approx(value, abs=0.01)
-        assert 0 < calibration.std[name] < 0.05
-    raw = estimates.score_elevation(estimates.estimate_elevation(recording, method=method), recording)
-    better = estimates.score_elevation(
-        estimates.estimate_elevation(recording, method=method, calibration=calibration), recording
-    )
-    assert better["rms"] < 0.2 * raw["rms"]
-
-
-def test_a_fused_calibration_keeps_what_goes_with_its_constants() -> None:
-    """The forward bias takes up g times the mounting pitch, and with that the next estimate holds beyond `until`."""
-    recording = biased(EXACT, ax=0.3)
-    calibration = estimates.calibrate(recording, "accelerometer_bias_x", method="fused", until=30.0)
-    assert calibration.values.item() == pytest.approx(0.3, abs=0.05)
-    assert abs(calibration.absorbed["mounting_pitch"].item()) == pytest.approx(9.8, rel=0.1)
-    held_out = calibration.held_out.iloc[0]
-    assert held_out["held_out"] < 0.3 * held_out["held_out_nominal"]
-
-
-def test_wheel_scale_and_delay_are_found() -> None:
-    late = EXACT.wheel.copy() / 1.02
-    late.index = late.index + 0.1
-    recording = biased(dataclasses.replace(EXACT, wheel=late), ax=0.1)
-    names = ["accelerometer_bias_x", "wheel_scale", "wheel_delay"]
-    calibration = estimates.calibrate(recording, names, method="slope")
-    np.testing.assert_allclose(calibration.values[names], [0.1, 1.02, 0.1], atol=0.01)
-
-
-def test_several_recordings_share_their_constants() -> None:
-    other = biased(exact_drive(start=1000.0), ax=0.3)
-    other = dataclasses.replace(other, reference=other.reference + 200.0, name="later")
-    calibration = estimates.calibrate([biased(EXACT, ax=0.3), other], "accelerometer_bias_x", method="slope")
-    assert calibration.values["accelerometer_bias_x"] == pytest.approx(0.3, abs=0.005)
-    assert list(calibration.held_out.index) == ["exact", "later"]
-    assert calibration.held_out["held_out"].isna().all()
-
-
-def test_gnss_speed_serves_where_there_is_no_wheel() -> None:
-    """Ground speed is less than the way's by the cosine of the slope: 0.2 % at 6 %."""
-    without = dataclasses.replace(EXACT, wheel=None)
-    score = estimates.score_elevation(estimates.estimate_elevation(without, method="slope"), without)
-    assert score["rms"] < 0.1
-
-
-def test_epoch_times_lose_no_digits() -> None:
-    for method in estimates.ELEVATION_METHODS:
-        now = estimates.estimate_elevation(EXACT, method=method)
-        epoch = estimates.estimate_elevation(exact_drive(start=1_700_000_000.0), method=method)
-        np.testing.assert_allclose(epoch["elevation"], now["elevation"], atol=1e-4)
-        assert epoch.index[0] == 1_700_000_000.0
-
-
-def test_double_precision_whatever_the_flag_says() -> None:
-    expected = estimates.estimate_elevation(EXACT, method="shirai")
-    with jax.enable_x64(False):
-        single = estimates.estimate_elevation(EXACT, method="shirai")
-        assert jnp.asarray(1.0).dtype == np.float32
-    pd.testing.assert_frame_equal(single, expected)
-
-
-def test_gaps_are_bridged_and_flagged() -> None:
-    holes = dataclasses.replace(
-        EXACT,
-        imu=EXACT.imu[(EXACT.imu.index < 40) | (EXACT.imu.index > 42)],
-        wheel=EXACT.wheel[(EXACT.wheel.index > 2) & ((EXACT.wheel.index < 15) | (EXACT.wheel.index > 20))],
-    )
-    estimate = estimates.estimate_elevation(holes, method="slope")
-    assert np.isfinite(estimate.drop(columns="valid").to_numpy()).all()
-    valid = estimate["valid"]
-    assert not valid[valid.index < 1.9].any() and not valid[(valid.index > 15.1) & (valid.index < 19.9)].any()
-    assert valid[(valid.index > 2.1) & (valid.index < 14.9)].all() and valid[valid.index > 42.1].all()
-    # 5 s at 12 m/s of a slope that could be 5 %
-    full = estimates.estimate_elevation(EXACT, method="slope")["elevation_std"]
-    added = np.sqrt((estimate["elevation_std"] ** 2 - full**2).clip(lower=0))
-    assert added.loc[14.0] < 0.3 and added.loc[21.0] == pytest.approx(0.05 * 12 * 5, rel=0.3)
-
-
-def test_initial_vertical_speed() -> None:
-    """Given, it goes before the calibration's; found, it is the slope's of the first second."""
-    moving = dataclasses.replace(
-        EXACT, **{s: getattr(EXACT, s).loc[12.0:] for s in ("imu", "wheel", "gnss", "reference")}
-    )
-    zero = estimates.estimate_elevation(moving, method="shirai", initial_vertical_speed=0.0)
-    climb = estimates.estimate_elevation(moving, method="shirai", initial_vertical_speed=0.5)
-    np.testing.assert_allclose(climb["elevation"] - zero["elevation"], 0.5 * (zero.index - 12.0), atol=1e-9)
-    found = estimates.estimate_elevation(moving, method="shirai")
-    truth = moving.gnss["v_u"].iloc[0]
-    # the slope half a second on, times the speed now
-    assert found["vertical_speed"].iloc[0] == pytest.approx(truth, abs=0.1)
-    calibration = estimates.calibrate(moving, ["accelerometer_bias_z", "initial_vertical_speed"], method="shirai")
-    again = estimates.estimate_elevation(moving, method="shirai", calibration=calibration, initial_vertical_speed=0.5)
-    assert again["vertical_speed"].iloc[0] == pytest.approx(0.5)
-
-
-def test_what_cannot_be_told_apart_is_named() -> None:
-    with pytest.warns(UserWarning, match="hardly tell accelerometer_bias_x and mounting_pitch apart"):
-        estimates.calibrate(EXACT, ["accelerometer_bias_x", "mounting_pitch"], method="slope")
-
-
-def test_a_calibration_reads_as_a_table() -> None:
-    calibration = estimates.calibrate(EXACT, "accelerometer_bias_x", method="slope", until=30.0)
-    for text in (repr(calibration), calibration._repr_html_()):
-        for word in ("slope", "accelerometer_bias_x", "m/s^2", "held_out", "exact"):
-            assert word in text
-
-
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (
-            lambda: estimates.estimate_elevation(EXACT, method="shiray"),
-            "method must be one of shirai, slope, fused, got 'shiray'",
-        ),
-        (
-            lambda: estimates.estimate_elevation(dataclasses.replace(EXACT, wheel=None, gnss=None)),
-            "'exact' has neither wheel speeds nor GNSS velocities",
-        ),
-        (lambda: estimates.estimate_elevation(dataclasses.replace(EXACT, imu=None)), "'exact' has no IMU stream"),
-        (
-            lambda: estimates.calibrate(EXACT, "accelerometer_bias", method="slope"),
-            "names out of accelerometer_bias_x, .* got accelerometer_bias for 1",
-        ),
-        (lambda: estimates.calibrate(EXACT, [], method="slope"), "got none for 1 recording"),
-        (
-            lambda: estimates.calibrate(EXACT, "accelerometer_bias_z", method="slope"),
-            "accelerometer_bias_z: changes nothing in method 'slope'",
-        ),
-        (lambda: estimates.calibrate(EXACT, "gnss_delay", method="slope"), "gnss_delay: changes nothing"),
-        (
-            lambda: estimates.calibrate(dataclasses.replace(EXACT, reference=None), "wheel_scale", method="slope"),
-            "'exact' has no reference heights",
-        ),
-        (lambda: estimates.calibrate(EXACT, "wheel_scale", method="slope", until=0.1), "need more reference than"),
-        (
-            lambda: estimates.calibrate([EXACT, EXACT], "initial_vertical_speed", method="shirai"),
-            "belongs to one recording",
-        ),
-        (
-            lambda: estimates.score_elevation(estimates.estimate_elevation(EXACT), EXACT, after=99.0),
-            "no reference heights after 99.0 s",
-        ),
-    ],
-)
-def test_what_cannot_be_done_is_said(call: object, message: str) -> None:
-    with pytest.raises(ValueError, match=message):
-        call()
-
-
-@pytest.fixture(scope="module")
-def comma(data_dir: Path) -> Recording:
-    with pytest.warns(RecordingWarning, match="magnetometer_uncalibrated"):
-        return read_recording(data_dir / "comma2k19-example")
-
-
-@pytest.fixture(scope="module")
-def rtk(data_dir: Path) -> Recording:
-    return read_recording(data_dir / "rtk-drive")
-
-
-def rms(recording: Recording, parameters: list[str], method: str, until: float | None) -> float:
-    calibration = estimates.calibrate(recording, parameters, method=method, until=until)
-    estimate = estimates.estimate_elevation(recording, method=method, calibration=calibration)
-    return estimates.score_elevation(estimate, recording)["rms_without_offset"]
-
-
-def test_comma_minute(comma: Recording) -> None:
-    """One constant on the first 20 s, scored on the minute; Shirai's in sample, its gross offset gone."""
-    assert rms(comma, ["accelerometer_bias_x"], "slope", 20.0) <= 1.6
-    assert rms(comma, ["accelerometer_bias_z", "initial_vertical_speed"], "shirai", None) <= 0.2
-
-
-def test_rtk_drive(rtk: Recording) -> None:
-    """In sample over 32 m of relief, and with the constant from the first 110 s."""
-    assert rms(rtk, ["accelerometer_bias_x"], "slope", None) <= 1.0
-    assert rms(rtk, ["accelerometer_bias_x"], "slope", rtk.imu.index[0] + 110.0) <= 1.5
-
-
-def test_two_standard_deviations_cover_the_real_drives_out_of_sample(comma: Recording, rtk: Recording) -> None:
-    for recording, until in ((comma, 20.0), (rtk, rtk.imu.index[0] + 110.0)):
-        for method, names in (
-            ("slope", ["accelerometer_bias_x"]),
-            ("shirai", ["accelerometer_bias_z", "initial_vertical_speed"]),
-        ):
-            calibration = estimates.calibrate(recording, names, method=method, until=until)
-            estimate = estimates.estimate_elevation(recording, method=method, calibration=calibration)
-            assert estimates.score_elevation(estimate, recording, after=until)["within_2_std"] > 0.6
+def test_verbs_take_what_is_promised_by_keyword(verb: str, arguments: tuple[str, ...]) -> None:
+    function = getattr(estimates, verb)
+    assert function is getattr(altijax, verb)
+    keyword_only = [
+        name
+        for name, parameter in inspect.signature(function).parameters.items()
+        if parameter.kind is inspect.Parameter.KEYWORD_ONLY
+    ]
+    assert set(arguments) <= set(keyword_only)

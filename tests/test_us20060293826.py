@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from altijax import speed_estimates
 from altijax.datasets import DatasetNotFoundError
 from altijax.recordings import Recording
-from altijax.speed_outages import outage_table
+from altijax.speed_estimate import estimates as speed_estimates
+from altijax.speed_estimate.outages import outage_table
 from papers_repro.comparison import Report
 from papers_repro.report import deviations
 from papers_repro.us20060293826 import outages

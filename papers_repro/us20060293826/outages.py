@@ -7,7 +7,7 @@ import pandas as pd
 
 from altijax.datasets import DatasetNotFoundError, load_dataset
 from altijax.recordings import RecordingWarning
-from altijax.speed_outages import outage_table
+from altijax.speed_estimate.outages import outage_table
 
 DRIVE = "rtk-drive"
 METHODS = {

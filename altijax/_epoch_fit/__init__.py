@@ -1,0 +1,1 @@
+"""The kernel behind `attitude.fit_attitudes`: cost, Levenberg-Marquardt steps and their trigonometry, in chunks."""

@@ -1,0 +1,156 @@
+"""Drives to try a calibration on: a town with turns, hills and stops, and what uncalibrated sensors record of it."""
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+from altijax._shapes import require_shape
+from altijax.calibration.drive_model import DRIVE_PARAMETERS
+from altijax.doppler import DopplerReceiver, doppler_velocity
+from altijax.motions import Readings, ideal_readings, road_pose
+from altijax.roads import SpeedProfile, winding_road
+from altijax.rotations import euler_to_matrix
+from altijax.sensors import Accelerometer, Gyro, accelerometer_output, gyro_output
+from altijax.signals import resample
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Manoeuvres:
+    """How a simulated drive is driven: legs of one minute from standstill to standstill on a winding, hilly road.
+
+    Attributes
+    ----------
+    speed : () m/s
+        Speed of the legs, before the variation.
+    ramp : () s
+        Time to reach it and to lose it: braking is at most about 2 speed / ramp.
+    standstill : () s
+        Time at rest before each leg.
+    variation : ()
+        Largest relative change of the speed under way.
+    turning : () rad
+        Largest angle between the road and its general direction.
+    slope : ()
+        Steepest rise per length.
+    """
+
+    speed: ArrayLike = 12.0
+    ramp: ArrayLike = 8.0
+    standstill: ArrayLike = 6.0
+    variation: ArrayLike = 0.15
+    turning: ArrayLike = 0.9
+    slope: ArrayLike = 0.05
+
+
+def town_drive(manoeuvres: Manoeuvres, t: ArrayLike, gravity: ArrayLike, *, legs: int = 5) -> Readings:
+    """Exact motion of a drive, and what ideal sensors aligned with the vehicle read.
+
+    Parameters
+    ----------
+    manoeuvres : Manoeuvres
+        How it is driven.
+    t : (time,) s
+        Times; a leg lasts a minute.
+    gravity : () m/s^2
+        Magnitude of gravity.
+    legs : int, optional
+        Number of legs.
+
+    Returns
+    -------
+    readings : Readings
+        Motion and readings.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit.
+    """
+    t = require_shape("t", t, (None,))
+    speed, ramp, rest, variation, turning, slope = (
+        jnp.asarray(getattr(manoeuvres, name), t.dtype)
+        for name in ("speed", "ramp", "standstill", "variation", "turning", "slope")
+    )
+    start = 60.0 * jnp.arange(legs, dtype=t.dtype) + rest
+    wave = 2 * jnp.pi / jnp.asarray([170.0], t.dtype)
+    profile = SpeedProfile(
+        start=start,
+        stop=start + 60.0 - rest - ramp,
+        ramp=jnp.full(legs, ramp),
+        speed=jnp.full(legs, speed),
+        modulation=variation / wave,
+        wavenumber=wave,
+        phase=jnp.zeros(1, t.dtype),
+    )
+    road = winding_road(
+        turning * jnp.asarray([0.7, 0.3], t.dtype),
+        jnp.asarray([330.0, 190.0], t.dtype),
+        jnp.asarray([0.0, 1.0], t.dtype),
+        slope * jnp.asarray([0.6, 0.4], t.dtype),
+        jnp.asarray([700.0, 260.0], t.dtype),
+        jnp.asarray([0.0, 2.0], t.dtype),
+        0.3,
+    )
+    return ideal_readings(partial(road_pose, road, profile), t, gravity)
+
+
+def recorded_drive(
+    readings: Readings,
+    parameters: ArrayLike,
+    *,
+    accelerometer: Accelerometer,
+    gyro: Gyro,
+    receiver: DopplerReceiver,
+    wheel_noise: ArrayLike,
+    epochs: int,
+    key: jax.Array,
+) -> dict[str, jax.Array]:
+    """What sensors with given parameters record of an exact motion.
+
+    Parameters
+    ----------
+    readings : Readings
+        The motion, at uniform times.
+    parameters : (12,)
+        True values in the order of `DRIVE_PARAMETERS`; the sensors are otherwise as the records say.
+    accelerometer, gyro, receiver
+        Records of the sensors, for their noise and rate.
+    wheel_noise : () m/s
+        Standard deviation of each wheel reading.
+    epochs : int
+        Number of epochs of the receiver.
+    key : key
+        Source of the noise.
+
+    Returns
+    -------
+    recorded : dict
+        t, f, w; t_gnss, v_gnss (NaN where an epoch is missing); t_wheel and wheel, at half the rate of the IMU.
+    """
+    t = readings.t
+    p = dict(zip(DRIVE_PARAMETERS, jnp.asarray(parameters, t.dtype), strict=True))
+    keys = jax.random.split(key, 4)
+    dt = t[1] - t[0]
+    mounting = euler_to_matrix(jnp.stack([0 * dt, p["mounting_pitch"], p["mounting_yaw"]]))
+    f, w = readings.f_b @ mounting, readings.w_b @ mounting
+    bias, rate_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
+    accelerometer = replace(accelerometer, bias=bias, scale=p["accelerometer_scale"])
+    t_gnss, v_gnss, valid = doppler_velocity(
+        replace(receiver, latency=p["gnss_delay"]), t, readings.velocity, epochs=epochs, key=keys[2]
+    )
+    t_wheel = t[2:-2:2]
+    speed, _ = resample(t_wheel - p["wheel_delay"], t, readings.speed, jnp.inf)
+    noise = wheel_noise * jax.random.normal(keys[3], speed.shape, t.dtype)
+    return {
+        "t": t,
+        "f": accelerometer_output(accelerometer, f, dt, key=keys[0]),
+        "w": gyro_output(replace(gyro, bias=rate_bias), w, f, dt, key=keys[1]),
+        "t_gnss": t_gnss,
+        "v_gnss": jnp.where(valid[:, None], v_gnss, jnp.nan),
+        "t_wheel": t_wheel,
+        "wheel": speed / p["wheel_scale"] + noise,
+    }

@@ -1,0 +1,1 @@
+"""Files as `recordings` reads them: checks of streams, the tidy folder, flight logs and receiver messages."""

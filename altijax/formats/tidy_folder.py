@@ -1,0 +1,280 @@
+"""The recording folder, our own format: recording.toml and one table a stream, read as they stand and scaled to SI."""
+
+import gzip
+import io
+import tomllib
+import warnings
+import zlib
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax.constants import GAL, STANDARD_GRAVITY
+from altijax.formats.stream_checks import SPEED_UNITS, RecordingError, check_overlap, clean_rows
+from altijax.wheels import speed_from_pulses, standstill_from_pulses
+
+WHEELS = ("left", "right", "front_left", "front_right", "rear_left", "rear_right")
+COLUMNS = {
+    "imu": ("t", "ax", "ay", "az", "gx", "gy", "gz", "temperature"),
+    "wheel": ("t", "speed", *WHEELS),
+    "pulses": ("t", "wheel"),
+    "gnss": ("t", "v_e", "v_n", "v_u", "speed", "course", "climb", "lat", "lon", "alt", "sd_e", "sd_n", "sd_u"),
+    "reference": ("t", "roll", "pitch", "heading", "v_e", "v_n", "v_u", "lat", "lon", "alt"),
+}
+_ENDINGS = (".csv", ".csv.gz", ".parquet")
+_SHEET: dict[str, dict[str, Any]] = {
+    "": {"name": str, "description": str, "axes": str, "wheel": dict, "site": dict, "source": dict},
+    "wheel": {"pulses_per_turn": float, "radius": float, "track_width": float},
+    "site": {"latitude": float, "height": float},
+    "source": {"origin": str, "licence": str},
+}
+
+_UNITS: dict[str, tuple[dict[str, float], dict[str, tuple[str, ...]]]] = {
+    "time": ({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}, {stream: ("t",) for stream in COLUMNS}),
+    "accelerometer": (
+        {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY, "gal": GAL},
+        {"imu": ("ax", "ay", "az")},
+    ),
+    "gyro": ({"rad/s": 1.0, "deg/s": np.pi / 180}, {"imu": ("gx", "gy", "gz")}),
+    "speed": (SPEED_UNITS, {"wheel": ("speed", *WHEELS)}),
+    "gnss_speed": (SPEED_UNITS, {"gnss": ("v_e", "v_n", "v_u", "speed", "climb", "sd_e", "sd_n", "sd_u")}),
+    "course": ({"deg": 1.0, "rad": 180 / np.pi}, {"gnss": ("course",)}),
+    "attitude": ({"rad": 1.0, "deg": np.pi / 180}, {"reference": ("roll", "pitch", "heading")}),
+}
+QUANTITIES = tuple(_UNITS)
+"""Quantities that may be stored in other units."""
+
+
+def is_tidy_folder(folder: Path) -> bool:
+    """Whether a folder holds a recording.toml or one of the streams' files."""
+    return (folder / "recording.toml").is_file() or any(_files(folder, stream) for stream in COLUMNS)
+
+
+def read_tidy_folder(
+    folder: Path, units: Mapping[str, str], problems: list[str]
+) -> tuple[dict[str, pd.DataFrame], dict[str, Any]]:
+    """Tables of the streams, in SI units and sensor axes, and what recording.toml says."""
+    sheet = _read_sheet(folder, problems)
+    tables = {}
+    for stream in COLUMNS:
+        files = _files(folder, stream)
+        if len(files) > 1:
+            names = ", ".join(file.name for file in files)
+            raise RecordingError(f"{folder.name}: {names} all hold the stream {stream!r}; keep one of them")
+        if files:
+            table = _read_table(files[0], stream, problems)
+            if len(table):
+                tables[stream] = table
+            elif stream != "imu":
+                problems.append(f"{files[0].name}: has no rows; the stream is left out")
+            else:
+                raise RecordingError(
+                    f"{files[0].name}: has no rows, and without it nothing can be estimated; record it again"
+                )
+    if "imu" not in tables:
+        found = ", ".join(sorted(file.name for file in folder.iterdir())) or "nothing"
+        raise RecordingError(f"{folder}: imu.csv (or .csv.gz, .parquet) is missing; found {found}")
+    _scale(tables, units)
+    if "pulses" in tables and "wheel" in tables:
+        file = tables.pop("pulses").attrs["file"]
+        problems.append(f"{file}: left out, because {tables['wheel'].attrs['file']} is there too")
+    return tables, sheet
+
+
+def wheel_from_pulses(
+    pulses: pd.DataFrame, sensor: Mapping[str, float], imu: pd.DataFrame, problems: list[str]
+) -> pd.DataFrame | None:
+    """Wheel speeds every 0.02 s as long as the IMU ran, since no pulse says that the wheel stands.
+
+    A wheel stands still where no pulse is within 1 s on either side.
+    """
+    file, line = pulses.attrs["file"], pulses.index.name
+    missing = [key for key in ("pulses_per_turn", "radius") if key not in sensor]
+    if missing:
+        raise RecordingError(f"{file}: needs {' and '.join(missing)} under [wheel] in recording.toml")
+    if "wheel" not in pulses.columns:
+        raise RecordingError(f"{file}: needs the column wheel besides t; write there which wheel gave the pulse")
+    names = pulses["wheel"].astype(str).str.strip()
+    wrong = ~names.isin(WHEELS)
+    if wrong.any():
+        first, seen = pulses.index[wrong][0], names[wrong].iloc[0]
+        raise RecordingError(f"{file}, {line} {first}, column wheel: {seen!r} is not a wheel; use {', '.join(WHEELS)}")
+    apart = list(check_overlap(pulses.set_index("t").sort_index(), imu))
+    if apart:
+        problems += apart
+        return None
+    times = {}
+    for name in [name for name in WHEELS if (names == name).any()]:
+        t_pulses = clean_rows(pulses.loc[names == name, ["t"]], ("t",), problems)["t"].to_numpy(float)
+        if t_pulses.size < 2:
+            problems.append(f"{file}, column wheel: {name} has {t_pulses.size} pulse, too few for a speed; left out")
+        else:
+            times[name] = t_pulses
+    if not times:
+        return None
+    t = np.arange(imu.index[0], imu.index[-1], 0.02)
+    t_pulses = np.full((len(times), max(map(len, times.values()))), np.inf)
+    for row, values in zip(t_pulses, times.values(), strict=True):
+        row[: len(values)] = values
+    with jax.enable_x64(True):
+        distance = 2 * np.pi * sensor["radius"] / sensor["pulses_per_turn"]
+        speeds = np.asarray(_pulse_speeds(t_pulses - t[0], t - t[0], distance))
+    table = pd.DataFrame({"t": t} | dict(zip(times, speeds, strict=True)))
+    table.index = pd.RangeIndex(1, 1 + len(table), name="row")
+    table.attrs["file"] = file
+    return table
+
+
+@jax.jit
+def _pulse_speeds(t_pulses: jax.Array, t: jax.Array, distance: float) -> jax.Array:
+    speed, _ = speed_from_pulses(t_pulses, t, distance)
+    return jnp.where(standstill_from_pulses(t_pulses, t, 1.0), 0, speed)
+
+
+def check_units(units: Mapping[str, str]) -> None:
+    """Raise for a quantity or a unit that is not known."""
+    for quantity, unit in units.items():
+        if quantity not in _UNITS:
+            raise ValueError(f"units has no quantity {quantity!r}; known are {', '.join(_UNITS)}")
+        if unit not in _UNITS[quantity][0]:
+            raise ValueError(f"units: {quantity} has no unit {unit!r}; known are {', '.join(_UNITS[quantity][0])}")
+
+
+def _files(folder: Path, stream: str) -> list[Path]:
+    return [folder / f"{stream}{ending}" for ending in _ENDINGS if (folder / f"{stream}{ending}").is_file()]
+
+
+def _read_sheet(folder: Path, problems: list[str]) -> dict[str, Any]:
+    path = folder / "recording.toml"
+    if not path.is_file():
+        return {}
+    try:
+        sheet = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RecordingError(f"recording.toml: {error}; correct that line") from error
+    for table, kinds in _SHEET.items():
+        entries = sheet.get(table, {}) if table else sheet
+        unknown = [key for key in entries if key not in kinds]
+        if unknown:
+            where = f" [{table}]" if table else ""
+            problems.append(f"recording.toml{where}: {', '.join(unknown)} ignored; known are {', '.join(kinds)}")
+        for key in entries.keys() & kinds.keys():
+            value = entries[key]
+            number = isinstance(value, int | float) and not isinstance(value, bool)
+            if not (number if kinds[key] is float else isinstance(value, kinds[key])):
+                kind = {float: "a number", str: "a text", dict: "a table"}[kinds[key]]
+                raise RecordingError(
+                    f"recording.toml, {table + '.' if table else ''}{key}: {value!r} is not {kind}; write one"
+                )
+    for key, value in sheet.get("wheel", {}).items():
+        if key in _SHEET["wheel"] and value <= 0:
+            raise RecordingError(f"recording.toml, wheel.{key}: {value!r} is not positive; write what was measured")
+    if abs(sheet.get("site", {}).get("latitude", 0)) > 90:
+        raise RecordingError(
+            f"recording.toml, site.latitude: {sheet['site']['latitude']!r} is not a latitude in degrees"
+        )
+    return sheet
+
+
+def _read_table(path: Path, stream: str, problems: list[str]) -> pd.DataFrame:
+    if path.suffix == ".parquet":
+        table = _read_parquet(path)
+    else:
+        table = _read_csv(path)
+    table.attrs["file"] = path.name
+    known = COLUMNS[stream]
+    if "t" not in table.columns:
+        seen = ", ".join(map(str, table.columns)) or "nothing"
+        hint = "separate columns by commas" if len(table.columns) == 1 else "the first line must name the columns"
+        raise RecordingError(f"{path.name}, line 1: there is no column t among {seen}; {hint}")
+    unknown = [str(column) for column in table.columns if column not in known]
+    if unknown:
+        problems.append(f"{path.name}: unknown columns {', '.join(unknown)} ignored; known are {', '.join(known)}")
+    table = table[[column for column in known if column in table.columns]]
+    return table.assign(**{column: _numbers(table, column) for column in table.columns if column != "wheel"})
+
+
+def _read_csv(path: Path) -> pd.DataFrame:
+    try:
+        content = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+    except (EOFError, gzip.BadGzipFile, zlib.error) as error:
+        raise RecordingError(f"{path.name}: damaged or cut short ({error}); copy it again from its source") from error
+    try:
+        with warnings.catch_warnings():
+            # Without an index column pandas only warns of a row that is longer than the header.
+            warnings.simplefilter("error", pd.errors.ParserWarning)
+            table = pd.read_csv(
+                io.BytesIO(content),
+                encoding="utf-8-sig",
+                index_col=False,
+                skip_blank_lines=False,
+                skipinitialspace=True,
+                low_memory=False,
+            )
+    except pd.errors.EmptyDataError:
+        return pd.DataFrame({"t": []})
+    except pd.errors.ParserWarning as error:
+        raise RecordingError(
+            f"{path.name}: its rows have more values than line 1 has names; name every column"
+        ) from error
+    except pd.errors.ParserError as error:
+        reason = str(error).strip().removeprefix("Error tokenizing data. C error: ")
+        raise RecordingError(f"{path.name}: {reason}; give every row as many values as line 1 has names") from error
+    except UnicodeDecodeError as error:
+        raise RecordingError(f"{path.name}: not UTF-8 text ({error.reason}); save it as CSV in UTF-8") from error
+    table.columns = [str(column).strip() for column in table.columns]
+    table.index = pd.RangeIndex(2, 2 + len(table), name="line")
+    # A blank line holds nothing that could be lost.
+    return table.dropna(how="all")
+
+
+def _read_parquet(path: Path) -> pd.DataFrame:
+    try:
+        table = pd.read_parquet(path)
+    except ImportError as error:
+        raise RecordingError(
+            f"{path.name}: reading Parquet needs pyarrow (pip install pyarrow), or save it as CSV"
+        ) from error
+    except (ValueError, OSError) as error:
+        raise RecordingError(f"{path.name}: not a Parquet file ({error}); copy it again from its source") from error
+    if table.index.name == "t":
+        table = table.reset_index()
+    table.index = pd.RangeIndex(1, 1 + len(table), name="row")
+    return table
+
+
+def _numbers(table: pd.DataFrame, column: str) -> pd.Series:
+    values = table[column]
+    if values.dtype.kind in "iuf":
+        return values.astype(float)
+    text = values.astype(str).str.strip().mask(values.isna(), "")
+    numbers = pd.to_numeric(text, errors="coerce")
+    bad = numbers.isna() & (text != "") & (text.str.lower() != "nan")
+    if bad.any():
+        line, seen = table.index[bad][0], text[bad].iloc[0]
+        raise RecordingError(
+            f"{table.attrs['file']}, {table.index.name} {line}, column {column}: {seen!r} is not a number; "
+            "write a plain number with a point, or leave the cell empty"
+        )
+    return numbers.astype(float)
+
+
+def _scale(tables: dict[str, pd.DataFrame], units: Mapping[str, str]) -> None:
+    for quantity, unit in units.items():
+        factors, targets = _UNITS[quantity]
+        used = False
+        for stream in targets.keys() & tables.keys():
+            columns = [column for column in targets[stream] if column in tables[stream].columns]
+            used |= bool(columns)
+            scaled = {column: tables[stream][column] * factors[unit] for column in columns}
+            tables[stream] = tables[stream].assign(**scaled)
+        if not used:
+            places = "; ".join(f"{stream}: {', '.join(columns)}" for stream, columns in targets.items())
+            raise ValueError(
+                f"units gives {quantity!r} in {unit!r}, but the recording has none of its columns ({places})"
+            )

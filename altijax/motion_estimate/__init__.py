@@ -1,0 +1,1 @@
+"""Attitude and velocity of a whole record from accelerations, gyro and Doppler velocities."""

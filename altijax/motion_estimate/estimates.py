@@ -1,0 +1,441 @@
+"""Attitude and velocity at every IMU sample of a recording, from accelerometer, gyro and GNSS Doppler velocities."""
+
+from dataclasses import dataclass, fields, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+from scipy.optimize import minimize
+from scipy.spatial.transform import Rotation, Slerp
+
+from altijax.calibration.records import Calibration
+from altijax.drives import imu_of, start_of
+from altijax.motion_estimate.intervals import MotionReadings, instants_at
+from altijax.motion_estimate.model import MotionNoise, Trajectory
+from altijax.motion_estimate.readings import motion_readings
+from altijax.motion_estimate.smoother import MotionFit, MotionPrior, motion_between, motion_pass
+from altijax.motion_estimate.start import window_attitudes
+from altijax.recordings import Recording
+
+MOTION_METHODS = ("epoch", "window", "batch")
+
+_LEVELS = tuple(field.name for field in fields(MotionNoise))
+_WALKS = ("gyro_walk", "accelerometer_walk")
+_WITH_GYRO = MotionNoise()
+# Without a gyro the attitude walks as the vehicle turns, and what lasts of its rate walks as well.
+_WITHOUT_GYRO = MotionNoise(rotation=0.1, gyro_walk=0.1)
+# By what factor, as a logarithm, levels may differ from these; records say least of the walks of biases.
+_SPREAD, _WALK_SPREAD = 1.5, 1.0
+# Delays of receivers, s.
+_DELAY, _DELAY_STD = 0.1, 0.3
+_DELAYS = np.arange(-0.2, 1.05, 0.1)
+_DELAYS_WITHOUT_GYRO = (0.05, 0.35, 0.65)
+# Standard deviations before anything is known: attitude and velocity can be anything.
+_ATTITUDE_STD, _VELOCITY_STD = 2.0, 100.0
+_ACCELEROMETER_BIAS_STD, _GYRO_BIAS_STD, _GYRO_SCALE_STD = 0.05, 0.07, 0.03
+# The accelerometer's scale acts mostly as a bias along gravity.
+_ACCELEROMETER_SCALE_STD = 0.015
+# What no record tells: the IMU's axes are at right angles, and those of both sensors the body's, to so many radians.
+_AXES_STD = 0.01
+_RATE_STD = 0.3  # of the vehicle's own turning, without a gyro, rad/s
+_MOUNT_STD, _WIND_STD = 0.1, 10.0
+# The course is trusted to so many radians where the epoch alone must do.
+_COURSE_STD = 0.3
+_WINDOW = 15.0  # s
+_WINDOW_WITHOUT_GYRO = 5.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Batch:
+    """What a search has found so far."""
+
+    fit: MotionFit
+    prior: MotionPrior
+    noise: MotionNoise
+    delay: float
+    objective: float
+
+
+def estimate_motion(
+    recording: Recording,
+    *,
+    method: str = "batch",
+    calibration: Calibration | None = None,
+    use_gyro: bool = True,
+    wind: bool | str = "auto",
+    delay: float | None = None,
+) -> pd.DataFrame:
+    """Attitude and velocity at the rate of the IMU, from velocities of 1 to 10 Hz, after [chalko2010]_.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an accelerometer and GNSS velocities; a gyro helps a lot.
+    method : {"batch", "window", "epoch"}
+        "epoch" finds an attitude for each epoch by itself, level and along the course as far as the epoch does not
+        tell; it never uses the gyro. "window" lets epochs around share an attitude that turns as the gyro says.
+        "batch" is the most probable motion of the whole record, with biases, noise levels and delay from the record
+        itself, and the only one whose error bars include all of these.
+    calibration : Calibration, optional
+        Constants known beforehand: accelerometer and gyro biases, `gnss_delay`.
+    use_gyro : bool
+        Whether the gyro is used where there is one.
+    wind : bool or "auto"
+        Whether body x may point off the course by a constant wind (an aircraft). True and False hold it near the
+        direction of travel, through the air or over ground. By itself: with a gyro it is free; without one it is held,
+        and the wind is in it where the courses flown show one. Only "batch" knows wind.
+    delay : float, optional
+        How late the stamps of the GNSS velocities are, in s; estimated by default ("epoch" cannot, and takes 0).
+
+    Returns
+    -------
+    estimate : DataFrame
+        Indexed as ``recording.imu``: roll, pitch, heading (rad), v_e, v_n, v_u (m/s), the standard deviation of each
+        (``roll_std`` ...), and valid, False where no GNSS velocity is near or the IMU has a gap. ``attrs`` has the
+        delay, noise levels, constants, wind and the normalised innovations squared (1 where the error bars are right).
+
+    Raises
+    ------
+    ValueError
+        If an option is unknown or a stream that is needed is missing.
+    """
+    if method not in MOTION_METHODS:
+        raise ValueError(f"method must be one of {', '.join(MOTION_METHODS)}, got {method!r}")
+    if wind not in (True, False, "auto"):
+        raise ValueError(f'wind must be True, False or "auto", got {wind!r}')
+    recording = _corrected(recording, calibration)
+    if delay is None and calibration is not None and "gnss_delay" in calibration.values:
+        delay = float(calibration.values["gnss_delay"])
+    use_gyro = use_gyro and method != "epoch" and "gx" in imu_of(recording)
+    with jax.enable_x64(True):
+        if method == "batch":
+            return _batch_estimate(recording, use_gyro, wind, delay)
+        return _window_estimate(recording, method, use_gyro, delay)
+
+
+def _corrected(recording: Recording, calibration: Calibration | None) -> Recording:
+    if calibration is None:
+        return recording
+    imu = imu_of(recording).copy()
+    for triad, sensor in (("a", "accelerometer"), ("g", "gyro")):
+        for axis in "xyz":
+            column = triad + axis
+            if column in imu:
+                common = calibration.values.get(f"{sensor}_scale", 1.0)
+                scale = calibration.values.get(f"{sensor}_scale_{axis}", common)
+                imu[column] = imu[column] / scale - calibration.values.get(f"{sensor}_bias_{axis}", 0.0)
+    return replace(recording, imu=imu)
+
+
+def _window_estimate(recording: Recording, method: str, use_gyro: bool, delay: float | None) -> pd.DataFrame:
+    search = delay is None and use_gyro
+    first = float(_DELAY if search else delay or 0.0)
+    readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=first)
+    if search:
+        delay = _delay_by_windows(readings, steps)
+        readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=delay)
+    delay = float(delay or 0.0)
+    length = {False: _WINDOW_WITHOUT_GYRO, True: _WINDOW}[use_gyro]
+    window = 1 if method == "epoch" else _odd(length / float(readings.spacing))
+    trajectory, attitude, _ = _windows(readings, delay, 2.0 if use_gyro else _COURSE_STD, steps, window, use_gyro)
+    covariance = np.zeros((len(attitude), 6, 6))
+    covariance[:, :3, :3] = np.asarray(attitude)
+    noise = replace(_WITH_GYRO if use_gyro else _WITHOUT_GYRO, acceleration=0.3)
+    instants = np.asarray(instants_at(readings, jnp.asarray(np.float64(delay))))
+    for axis, std in enumerate(np.asarray(readings.std).T):
+        known = np.isfinite(std)
+        velocity = np.full(std.shape, _VELOCITY_STD)
+        if known.any():
+            away = np.abs(instants[:, None] - instants[known]).min(1)
+            velocity = np.interp(instants, instants[known], std[known]) + 0.3 * away
+        covariance[:, 3 + axis, 3 + axis] = velocity**2
+    estimate = _at_samples(recording, readings, trajectory, covariance, noise, delay, steps)
+    estimate.attrs = {"delay": delay}
+    return estimate
+
+
+def _batch_estimate(recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None) -> pd.DataFrame:
+    first = _DELAY if delay is None else delay
+    readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=first)
+    if delay is None and use_gyro:
+        first = _delay_by_windows(readings, steps)
+    batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first)
+    batch = _most_probable(readings, batch, steps, estimate_delay=delay is None)
+    if wind == "auto" and not use_gyro and _turns_around(readings):
+        with_wind = batch.prior.covariance.at[[16, 17], [16, 17]].set(_WIND_STD**2)
+        windy = _most_probable(
+            readings,
+            replace(batch, prior=replace(batch.prior, covariance=with_wind)),
+            steps,
+            estimate_delay=delay is None,
+        )
+        vector = np.asarray(windy.fit.trajectory.constants)[4:]
+        error = np.sqrt(np.diag(np.asarray(windy.fit.covariance)[-1])[16:])
+        # Ten in the logarithm pays for two more constants many times over; below 1 m/s a wind is a crooked mount.
+        if batch.objective - windy.objective > 10 and np.hypot(*vector) > max(1.0, 4 * float(np.max(error))):
+            batch = windy
+    covariance = np.asarray(batch.fit.covariance)
+    estimate = _at_samples(
+        recording, readings, batch.fit.trajectory, covariance[:, :6, :6], batch.noise, batch.delay, steps
+    )
+    estimate.attrs.update(_summary(readings, batch))
+    return estimate
+
+
+def _first_batch(
+    recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None, first: float
+) -> tuple[_Batch, MotionReadings, int]:
+    """The best of several starts: turned about the vertical with a gyro, by several delays without."""
+    noise = _as_arrays(_WITH_GYRO if use_gyro else _WITHOUT_GYRO)
+    course = not use_gyro or wind != "auto"
+    constants = [_GYRO_SCALE_STD if use_gyro else 0.0] * 3 + [_MOUNT_STD if course else 0.0]
+    constants += [_WIND_STD if wind is True else 0.0] * 2
+    std = [_ATTITUDE_STD] * 3 + [_VELOCITY_STD] * 3 + [_ACCELEROMETER_BIAS_STD] * 3
+    std += [_GYRO_BIAS_STD if use_gyro else _RATE_STD] * 3 + constants
+    covariance = np.diag(np.square(std))
+    force = imu_of(recording)[["ax", "ay", "az"]].to_numpy(float).mean(0)
+    covariance[6:9, 6:9] += _ACCELEROMETER_SCALE_STD**2 * np.outer(force, force)
+    delays = _DELAYS_WITHOUT_GYRO if delay is None and not use_gyro else (first,)
+    turns = (0.0, 0.5, 1.0, 1.5) if use_gyro else (0.0,)
+    best: tuple[_Batch, MotionReadings, int] | None = None
+    for trial in delays:
+        readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=trial)
+        prior = MotionPrior(
+            covariance=jnp.asarray(covariance),
+            doubt=jnp.ones_like(readings.std),
+            course=jnp.asarray(1.0 if course else 0.0),
+        )
+        window = _odd(_WINDOW / float(readings.spacing)) if use_gyro else 1
+        start, _, _ = _windows(readings, trial, 2.0 if use_gyro else _COURSE_STD, steps, window, use_gyro)
+        for turn in turns:
+            C = jnp.asarray(Rotation.from_rotvec([0.0, 0.0, turn * np.pi]).as_matrix()) @ start.C_nb
+            fit = _passes(readings, replace(start, C_nb=C), prior, noise, trial, steps, passes=5)
+            objective = -float(fit.log_likelihood) + 0.5 * ((trial - _DELAY) / _DELAY_STD) ** 2
+            if best is None or objective < best[0].objective - 1.0:
+                batch = _Batch(fit=fit, prior=prior, noise=noise, delay=float(trial), objective=objective)
+                best = batch, readings, steps
+    assert best is not None
+    return best
+
+
+def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estimate_delay: bool) -> _Batch:
+    """Noise levels, delay and trajectory in turns, until the levels stay."""
+    prior, noise, delay = batch.prior, batch.noise, batch.delay
+    trajectory = batch.fit.trajectory
+    names = [name for name in _LEVELS if name != "course" or float(prior.course) > 0]
+    start = _WITH_GYRO if float(prior.covariance[12, 12]) > 0 else _WITHOUT_GYRO
+    nominal = np.append(np.log([float(getattr(start, name)) for name in names]), _DELAY)
+    spread = np.append([_WALK_SPREAD if name in _WALKS else _SPREAD for name in names], _DELAY_STD)
+    objective = np.inf
+    for turn in range(6):
+        x0 = np.append(np.log([float(getattr(noise, name)) for name in names]), delay)
+
+        reach = np.append(np.full(len(names), 2.0), 0.15 if estimate_delay else 0.0)
+        found = minimize(
+            _misfit,
+            x0,
+            args=(names, nominal, spread, readings, trajectory, prior, noise, steps),
+            jac=True,
+            method="L-BFGS-B",
+            bounds=list(zip(x0 - reach, x0 + reach, strict=True)),
+            options={"maxiter": 12, "maxfun": 16, "ftol": 1e-5},
+        )
+        noise = _as_arrays(replace(noise, **dict(zip(names, np.exp(found.x[:-1]).tolist(), strict=True))))
+        delay = float(found.x[-1])
+        fit = _passes(readings, trajectory, prior, noise, delay, steps, passes=8)
+        trajectory, prior = fit.trajectory, replace(prior, doubt=fit.doubt)
+        settled = turn > 1 and abs(found.fun - objective) < 1.0
+        objective = float(found.fun)
+        if settled:
+            break
+    fit = _passes(readings, trajectory, prior, noise, delay, steps, passes=8)
+    return _Batch(fit=fit, prior=prior, noise=noise, delay=delay, objective=objective)
+
+
+def _misfit(
+    x: np.ndarray,
+    names: list[str],
+    nominal: np.ndarray,
+    spread: np.ndarray,
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    prior: MotionPrior,
+    noise: MotionNoise,
+    steps: int,
+) -> tuple[float, np.ndarray]:
+    """Minus the log-posterior of the logarithms of noise levels and the delay, and its gradient."""
+    levels = dict(zip(names, np.exp(x[:-1]).tolist(), strict=True))
+    fit = _pass(readings, trajectory, prior, _as_arrays(replace(noise, **levels)), jnp.asarray(x[-1]), steps)
+    slope = [-float(np.asarray(getattr(fit.by_noise, name))) * levels[name] for name in names] + [-float(fit.by_delay)]
+    off = (x - nominal) / spread
+    return -float(fit.log_likelihood) + 0.5 * float(off @ off), np.array(slope) + off / spread
+
+
+@partial(jax.jit, static_argnames="steps")
+def _pass(
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    prior: MotionPrior,
+    noise: MotionNoise,
+    delay: jax.Array,
+    steps: int,
+) -> MotionFit:
+    return motion_pass(readings, trajectory, prior, noise, delay, steps)
+
+
+def _passes(
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    prior: MotionPrior,
+    noise: MotionNoise,
+    delay: float,
+    steps: int,
+    passes: int,
+) -> MotionFit:
+    for _ in range(passes):
+        fit = _pass(readings, trajectory, prior, noise, jnp.asarray(np.float64(delay)), steps)
+        trajectory = fit.trajectory
+        if float(fit.step) < 1e-4:
+            break
+    return fit
+
+
+@partial(jax.jit, static_argnames=("steps", "window", "gyro"))
+def _windowed(
+    readings: MotionReadings, delay: jax.Array, prior_std: jax.Array, steps: int, window: int, gyro: bool
+) -> tuple[Trajectory, jax.Array, jax.Array]:
+    return window_attitudes(readings, delay, prior_std, steps, window, gyro=gyro)
+
+
+def _windows(
+    readings: MotionReadings, delay: float, prior_std: float, steps: int, window: int, gyro: bool
+) -> tuple[Trajectory, jax.Array, jax.Array]:
+    return _windowed(readings, jnp.asarray(np.float64(delay)), jnp.asarray(np.float64(prior_std)), steps, window, gyro)
+
+
+def _delay_by_windows(readings: MotionReadings, steps: int) -> float:
+    """Delay at which windows of epochs, turned by the gyro, fit best: the least of a grid and its neighbours."""
+    window = _odd(_WINDOW / float(readings.spacing))
+    misfits = np.array([float(_windows(readings, delay, 2.0, steps, window, True)[2]) for delay in _DELAYS])
+    k = int(np.clip(np.argmin(misfits), 1, len(_DELAYS) - 2))
+    before, least, after = misfits[k - 1 : k + 2]
+    bend = before - 2 * least + after
+    offset = 0.5 * (before - after) / bend if bend > 0 else 0.0
+    return float(_DELAYS[k] + np.clip(offset, -1, 1) * (_DELAYS[1] - _DELAYS[0]))
+
+
+def _odd(count: float) -> int:
+    return 2 * round(max(count - 1, 2) / 2) + 1
+
+
+def _as_arrays(noise: MotionNoise) -> MotionNoise:
+    return MotionNoise(**{name: jnp.asarray(np.float64(getattr(noise, name))) for name in _LEVELS})
+
+
+def _turns_around(readings: MotionReadings) -> bool:
+    """Whether the courses spread enough to tell a wind from a crooked mount."""
+    v = np.asarray(readings.v_gnss)[np.isfinite(np.asarray(readings.std)[:, 0]), :2]
+    speed = np.hypot(*v.T)
+    moving = speed > 3.0
+    return bool(moving.sum() > 10 and np.linalg.norm(np.mean(v[moving] / speed[moving, None], 0)) < 0.8)
+
+
+def _summary(readings: MotionReadings, batch: _Batch) -> dict[str, object]:
+    there = np.isfinite(np.asarray(readings.std))
+    constants = np.asarray(batch.fit.trajectory.constants)
+    surprise = np.asarray(batch.fit.surprise)[there]
+    return {
+        "delay": batch.delay,
+        "noise": {name: float(getattr(batch.noise, name)) for name in _LEVELS},
+        "nis": float(np.mean(surprise**2)),
+        "outliers": int(np.sum(np.asarray(batch.prior.doubt)[there] > 1)),
+        "wind": constants[4:].tolist() if float(batch.prior.covariance[16, 16]) > 0 else None,
+        "gyro_scale": (1 / (1 + constants[:3])).tolist(),
+        "accelerometer_bias": np.asarray(batch.fit.trajectory.accelerometer_bias).mean(0).tolist(),
+        "gyro_bias": np.asarray(batch.fit.trajectory.gyro_bias).mean(0).tolist(),
+        "objective": batch.objective,
+    }
+
+
+@partial(jax.jit, static_argnames="steps")
+def _between(readings: MotionReadings, trajectory: Trajectory, delay: jax.Array, steps: int) -> tuple:
+    return motion_between(readings, trajectory, delay, steps)
+
+
+def _at_samples(
+    recording: Recording,
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    covariance: np.ndarray,
+    noise: MotionNoise,
+    delay: float,
+    steps: int,
+) -> pd.DataFrame:
+    """Attitude, velocity and their errors at each IMU sample."""
+    imu = imu_of(recording)
+    t = imu.index.to_numpy(float) - start_of(recording)
+    instants = np.asarray(instants_at(readings, jnp.asarray(np.float64(delay))))
+    ends, C, v, gained = map(np.asarray, _between(readings, trajectory, jnp.asarray(np.float64(delay)), steps))
+    knots = np.append(instants[0], ends.ravel())
+    kept = np.append(True, np.diff(np.maximum.accumulate(knots)) > 1e-9)
+    knots = knots[kept]
+    attitudes = np.concatenate([np.asarray(trajectory.C_nb)[:1], C.reshape(-1, 3, 3)])[kept]
+    velocities = np.concatenate([np.asarray(trajectory.v_n)[:1], v.reshape(-1, 3)])[kept]
+    inside = np.clip(t, knots[0], knots[-1])
+    C_nb = Slerp(knots, Rotation.from_matrix(attitudes))(inside).as_matrix()
+
+    distinct = np.append(True, np.diff(instants) > 1e-9)
+    nodes, P = instants[distinct], covariance[distinct]
+    k = np.clip(np.searchsorted(nodes, inside, side="right") - 1, 0, nodes.size - 2)
+    dt = nodes[k + 1] - nodes[k]
+    s = (inside - nodes[k]) / dt
+    P = (1 - s)[:, None, None] * P[k] + s[:, None, None] * P[k + 1]
+    # Between two known ends a random walk has the variance s (1 - s) dt.
+    bridge = s * (1 - s) * dt
+    rotation, acceleration = (float(np.asarray(level)) ** 2 for level in (noise.rotation, noise.acceleration))
+    force = np.linalg.norm(gained[np.flatnonzero(distinct)[k]], axis=-1) / dt
+    attitude = P[:, :3, :3] + (rotation * bridge + _AXES_STD**2)[:, None, None] * np.eye(3)
+    velocity = np.diagonal(P, axis1=1, axis2=2)[:, 3:6] + (acceleration * bridge)[:, None]
+    velocity = velocity + (rotation * bridge * (force * dt) ** 2 / 12)[:, None]
+
+    pitch = np.arcsin(np.clip(C_nb[:, 2, 0], -1, 1))
+    yaw = np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0])
+    columns = {
+        "roll": np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]),
+        "pitch": pitch,
+        "heading": np.mod(np.pi / 2 - yaw, 2 * np.pi),
+    }
+    columns |= {name: np.interp(inside, knots, velocities[:, i]) for i, name in enumerate(("v_e", "v_n", "v_u"))}
+    # Small turns in axes that yaw with the body, to roll, pitch and yaw: upright poles have a roll of any size.
+    sin, cos = np.sin(yaw), np.cos(yaw)
+    cos_pitch = np.maximum(np.cos(pitch), 0.05)
+    zero, one = np.zeros_like(yaw), np.ones_like(yaw)
+    rows = [
+        [cos / cos_pitch, sin / cos_pitch, zero],
+        [sin, -cos, zero],
+        [-np.tan(np.clip(pitch, -1.5, 1.5)) * cos, -np.tan(np.clip(pitch, -1.5, 1.5)) * sin, one],
+    ]
+    for name, row in zip(("roll", "pitch", "heading"), rows, strict=True):
+        slope = np.stack(row, -1)
+        variance = np.einsum("ti,tij,tj->t", slope, attitude, slope)
+        # No angle is less certain than one of which nothing is known.
+        columns[f"{name}_std"] = np.minimum(np.sqrt(np.maximum(variance, 0)), np.pi / np.sqrt(3))
+    for i, name in enumerate(("v_e", "v_n", "v_u")):
+        columns[f"{name}_std"] = np.sqrt(np.maximum(velocity[:, i], 0))
+    return pd.DataFrame(columns, index=imu.index).assign(valid=_supported(readings, t, delay))
+
+
+def _supported(readings: MotionReadings, t: np.ndarray, delay: float) -> np.ndarray:
+    """Where GNSS velocities lie close on both sides and the IMU has no gap."""
+    epochs = np.asarray(readings.instant)[np.isfinite(np.asarray(readings.std)[:, 0])] - delay
+    longest = max(5 * float(readings.spacing), 2.0)
+    k = np.searchsorted(epochs, t)
+    before = t - epochs[np.clip(k - 1, 0, epochs.size - 1)]
+    after = epochs[np.clip(k, 0, epochs.size - 1)] - t
+    beyond = (k == 0) | (k == epochs.size)
+    near = np.where(beyond, np.maximum(before, after) <= 2 * float(readings.spacing), before + after <= longest)
+    usual = float(np.median(np.diff(t)))
+    gap = np.diff(t, prepend=t[0]) > max(5 * usual, 0.1)
+    return near & ~gap

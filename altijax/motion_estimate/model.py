@@ -1,0 +1,281 @@
+"""Attitude, velocity and sensor constants between GNSS epochs, as a linear model of small errors about a trajectory.
+
+The error state of each instant, about the trajectory it is linearised at:
+
+    0-2    attitude, a rotation vector in navigation axes: C_nb true = exp(error) C_nb
+    3-5    velocity, m/s
+    6-8    accelerometer bias, m/s^2
+    9-11   gyro bias, rad/s
+    12-14  inverse gyro scale less one
+    15     yaw of body x from the direction of travel through the air, rad
+    16-17  wind towards East and North, m/s
+
+The last six are constants. A state that does not exist has zero prior variance. Without a gyro the readings of the rate
+are zero: the attitude walks at random, and the bias takes the part of the rate of turn that lasts.
+
+The trajectory need not obey its own dynamics: what is missing at each step is part of the model, so that repeating
+linearisation and smoothing is the Gauss-Newton method on the whole record and ends at its most probable trajectory.
+"""
+
+from dataclasses import dataclass, replace
+
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+from altijax import _safe
+from altijax._shapes import require_shape
+from altijax.motion_estimate.preintegration import Preintegrated, preintegrate, relative_attitudes
+from altijax.rotations import matrix_to_rotvec, rotvec_to_matrix, skew
+
+STATES = 18
+
+# Speed through the air below which body x says little of the direction of travel, m/s.
+_SLIP = 0.5
+# How fast attitude and velocity may change unseen in a gap of the IMU: rad/s and m/s^2.
+_UNSEEN_TURN, _UNSEEN_ACCELERATION = 0.5, 3.0
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class MotionNoise:
+    """Noise levels of the model.
+
+    Attributes
+    ----------
+    rotation : () rad/s^0.5
+        Random walk of the attitude: the gyro's noise, or without a gyro the turning itself.
+    acceleration : () m/s^1.5
+        Random walk of the velocity: noise and vibration of the accelerometer.
+    gyro_walk : () rad/s^1.5
+        Random walk of the gyro bias.
+    accelerometer_walk : () m/s^2.5
+        Random walk of the accelerometer bias.
+    horizontal : ()
+        Factor on the standard deviations of the horizontal velocities.
+    vertical : ()
+        The same of the vertical ones.
+    course : () rad s^0.5
+        Body x against the direction of travel, for a mean over one second.
+    """
+
+    rotation: ArrayLike = 0.005
+    acceleration: ArrayLike = 0.05
+    gyro_walk: ArrayLike = 1e-4
+    accelerometer_walk: ArrayLike = 1e-3
+    horizontal: ArrayLike = 1.0
+    vertical: ArrayLike = 1.0
+    course: ArrayLike = 0.1
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Trajectory:
+    """States at a series of instants.
+
+    Attributes
+    ----------
+    C_nb : (time, 3, 3)
+        Attitude.
+    v_n : (time, 3) m/s
+        Velocity, East, North and up.
+    accelerometer_bias : (time, 3) m/s^2
+        Bias.
+    gyro_bias : (time, 3) rad/s
+        Bias.
+    constants : (6,)
+        Inverse gyro scales less one (3), yaw of body x from the direction of travel (rad), wind to East and North
+        (m/s).
+    """
+
+    C_nb: jax.Array
+    v_n: jax.Array
+    accelerometer_bias: jax.Array
+    gyro_bias: jax.Array
+    constants: jax.Array
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Intervals:
+    """Readings between the instants.
+
+    Attributes
+    ----------
+    f_b : (intervals, steps, 3) m/s^2
+        Mean specific force of equal steps.
+    w_b : (intervals, steps, 3) rad/s
+        Mean angular rate of the same; zero without a gyro.
+    duration : (intervals,) s
+        Length of each interval.
+    gap : (intervals,) s
+        How much of it no reading supports.
+    """
+
+    f_b: jax.Array
+    w_b: jax.Array
+    duration: jax.Array
+    gap: jax.Array
+
+
+def preintegrated_intervals(trajectory: Trajectory, intervals: Intervals) -> tuple[Preintegrated, jax.Array]:
+    """Readings corrected by the trajectory's constants and summed over each interval.
+
+    Returns
+    -------
+    preintegrated : Preintegrated
+        Of each interval.
+    miss : (intervals, 3) rad
+        Rotation vector, in navigation axes, from the attitude that the gyro leads to to the trajectory's own.
+    """
+    C, scale = trajectory.C_nb[:-1], 1 + trajectory.constants[:3]
+    dt = intervals.duration / intervals.f_b.shape[1]
+    w_b = intervals.w_b * scale - trajectory.gyro_bias[:-1, None]
+    f_b = intervals.f_b - trajectory.accelerometer_bias[:-1, None]
+
+    by_gyro = relative_attitudes(w_b, dt)
+    reached = jnp.swapaxes(C, -1, -2) @ trajectory.C_nb[1:]
+    turn = matrix_to_rotvec(reached @ jnp.swapaxes(by_gyro[:, -1], -1, -2))
+    summed = preintegrate(f_b, w_b, by_gyro, turn, dt)
+    bias = trajectory.gyro_bias[:-1, None]
+
+    def by_raw_rate(columns: jax.Array) -> jax.Array:
+        """The scale multiplies the reading before the bias is taken off."""
+        return columns.at[..., 3:].set((columns[..., 3:] - bias * columns[..., :3]) / scale)
+
+    summed = replace(
+        summed,
+        turn_by_gyro=by_raw_rate(summed.turn_by_gyro),
+        velocity_by_gyro=by_raw_rate(summed.velocity_by_gyro),
+    )
+    return summed, jnp.einsum("kij,kj->ki", C, turn)
+
+
+def motion_transitions(
+    trajectory: Trajectory, intervals: Intervals, noise: MotionNoise, gravity: ArrayLike
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Transition of the error state over each interval.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Where to linearise.
+    intervals : Intervals
+        Readings.
+    noise : MotionNoise
+        Noise levels.
+    gravity : () m/s^2
+        Magnitude of gravity.
+
+    Returns
+    -------
+    F : (intervals, 18, 18)
+        Derivative of the state by the one before.
+    c : (intervals, 18)
+        What is missing for the trajectory to obey its own dynamics.
+    Q : (intervals, 18, 18)
+        Covariance of the noise.
+    """
+    preintegrated, miss = preintegrated_intervals(trajectory, intervals)
+    gravity = require_shape("gravity", gravity, ())
+    down = jnp.array([0, 0, -1], gravity.dtype) * gravity
+
+    def one(
+        C: jax.Array, v: jax.Array, v_next: jax.Array, p: Preintegrated, miss: jax.Array, dt: jax.Array, gap: jax.Array
+    ) -> tuple[jax.Array, jax.Array, jax.Array]:
+        gained = C @ p.velocity[-1]
+        by_turn = C @ p.velocity_by_turn @ C.T
+        identity = jnp.eye(3, dtype=C.dtype)
+        F = jnp.eye(STATES, dtype=C.dtype)
+        F = F.at[:3, 9:15].set(C @ p.turn_by_gyro)
+        F = F.at[3:6, :3].set(-skew(gained))
+        F = F.at[3:6, 6:9].set(C @ p.velocity_by_bias)
+        F = F.at[3:6, 9:15].set(C @ p.velocity_by_gyro)
+        c = jnp.zeros(STATES, C.dtype).at[:3].set(-miss)
+        c = c.at[3:6].set(v + down * dt + gained - v_next - by_turn @ miss)
+        turned = noise.rotation**2 * dt + (_UNSEEN_TURN * gap) ** 2
+        # An even turn is what the ends of a random walk leave on average; about it the walk still wanders.
+        wander = skew(gained) @ skew(gained).T / 12
+        moved = noise.acceleration**2 * dt + (_UNSEEN_ACCELERATION * gap) ** 2
+        Q = jnp.zeros((STATES, STATES), C.dtype)
+        Q = Q.at[:3, :3].set(turned * identity)
+        Q = Q.at[3:6, :3].set(turned * by_turn)
+        Q = Q.at[:3, 3:6].set(turned * by_turn.T)
+        Q = Q.at[3:6, 3:6].set(turned * (by_turn @ by_turn.T + wander) + moved * identity)
+        Q = Q.at[6:9, 6:9].set(noise.accelerometer_walk**2 * dt * identity)
+        Q = Q.at[9:12, 9:12].set(noise.gyro_walk**2 * dt * identity)
+        return F, c, Q
+
+    before, after = slice(None, -1), slice(1, None)
+    F, c, Q = jax.vmap(one)(
+        trajectory.C_nb[before],
+        trajectory.v_n[before],
+        trajectory.v_n[after],
+        preintegrated,
+        miss,
+        intervals.duration,
+        intervals.gap,
+    )
+    c = c.at[:, 6:9].set(trajectory.accelerometer_bias[before] - trajectory.accelerometer_bias[after])
+    return F, c.at[:, 9:12].set(trajectory.gyro_bias[before] - trajectory.gyro_bias[after]), Q
+
+
+def motion_measurements(
+    trajectory: Trajectory, v_gnss: ArrayLike, variance: ArrayLike, course_variance: ArrayLike
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Measurements at each instant: three velocities, and the direction of travel against body x.
+
+    Parameters
+    ----------
+    trajectory : Trajectory
+        Where to linearise.
+    v_gnss : (time, 3) m/s
+        Measured velocity.
+    variance : (time, 3) m^2/s^2
+        Its variances; infinite where there is no measurement.
+    course_variance : (time,) rad^2
+        Variance of the angle between body x and the direction of travel; infinite where it is not to be used.
+
+    Returns
+    -------
+    z : (time, 4)
+        Measurement less what the trajectory has.
+    H : (time, 4, 18)
+        Derivative by the error state.
+    R : (time, 4)
+        Variances.
+    """
+    v_gnss = require_shape("v_gnss", v_gnss, (None, 3))
+    variance = require_shape("variance", variance, v_gnss.shape)
+    course_variance = require_shape("course_variance", course_variance, v_gnss.shape[:1])
+
+    def angle(x: jax.Array, C: jax.Array, v: jax.Array) -> jax.Array:
+        """Body x clockwise from the direction of travel, less its constant part: zero on average."""
+        forward = (rotvec_to_matrix(x[:3]) @ C)[:, 0]
+        constants = trajectory.constants + x[12:]
+        air = (v + x[3:6])[:2] - constants[4:6]
+        across = forward[0] * air[1] - forward[1] * air[0]
+        return _safe.arctan2(across, forward[:2] @ air) + constants[3]
+
+    zero = jnp.zeros(STATES, v_gnss.dtype)
+    misses, slopes = jax.vmap(jax.value_and_grad(angle), in_axes=(None, 0, 0))(zero, trajectory.C_nb, trajectory.v_n)
+    air = trajectory.v_n[:, :2] - trajectory.constants[4:6]
+    course_variance = course_variance + _SLIP**2 / jnp.maximum(jnp.sum(air * air, -1), 1e-6)
+    R = jnp.concatenate([variance, course_variance[:, None]], -1)
+    there = jnp.isfinite(R)
+    z = jnp.concatenate([v_gnss - trajectory.v_n, -misses[:, None]], -1)
+    velocity = jnp.broadcast_to(jnp.zeros((3, STATES)).at[:, 3:6].set(jnp.eye(3)), (len(z), 3, STATES))
+    H = jnp.concatenate([velocity.astype(z.dtype), slopes[:, None]], -2)
+    return jnp.where(there, z, 0), jnp.where(there[..., None], H, 0), jnp.where(there, R, 1)
+
+
+def moved(trajectory: Trajectory, x: ArrayLike) -> Trajectory:
+    """The trajectory with an error state added at each instant, the constants' from the last."""
+    x = require_shape("x", x, (trajectory.v_n.shape[0], STATES))
+    return Trajectory(
+        C_nb=rotvec_to_matrix(x[:, :3]) @ trajectory.C_nb,
+        v_n=trajectory.v_n + x[:, 3:6],
+        accelerometer_bias=trajectory.accelerometer_bias + x[:, 6:9],
+        gyro_bias=trajectory.gyro_bias + x[:, 9:12],
+        constants=trajectory.constants + x[-1, 12:],
+    )

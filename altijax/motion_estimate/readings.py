@@ -1,0 +1,124 @@
+"""From a recording to the arrays of the motion estimators: summed IMU readings, and instants with velocities."""
+
+import jax.numpy as jnp
+import numpy as np
+
+from altijax.drives import gravity_at, imu_of, start_of
+from altijax.motion_estimate.intervals import MotionReadings
+from altijax.recordings import Recording
+
+# Standard deviation of a velocity whose receiver states none, before it is estimated, m/s.
+_VELOCITY_STD = 0.1
+_ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
+# Sizes are rounded up to multiples of these, so that recordings of like length share what was compiled.
+_SAMPLES, _INSTANTS, _STEPS = 2048, 64, 8
+
+
+def motion_readings(recording: Recording, *, use_gyro: bool, delay: float) -> tuple[MotionReadings, int]:
+    """Arrays of a recording; call it in double precision (`jax.enable_x64`).
+
+    Parameters
+    ----------
+    recording : Recording
+        With an IMU and GNSS velocities.
+    use_gyro : bool
+        Whether the rates are taken; they are zero otherwise.
+    delay : float
+        About how late the receiver's stamps are, in s; it decides which epochs the IMU covers.
+
+    Returns
+    -------
+    readings : MotionReadings
+        The arrays.
+    steps : int
+        Steps of an interval that resolve the IMU's samples.
+
+    Raises
+    ------
+    ValueError
+        If a stream is missing or the velocities do not overlap with the IMU.
+    """
+    imu, start = imu_of(recording), start_of(recording)
+    t = imu.index.to_numpy(float) - start
+    usual = float(np.median(np.diff(t)))
+    gyro = imu[_GYRO].to_numpy(float) if use_gyro else np.zeros((t.size, 3))
+    gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
+    readings = np.concatenate([imu[_ACCELEROMETER].to_numpy(float), gyro, np.zeros((t.size, 1))], -1)
+    pad = -t.size % _SAMPLES + 1
+    t_padded = np.append(t, t[-1] + usual * np.arange(1, pad + 1))
+    readings = np.concatenate([readings, np.repeat(readings[-1:], pad, 0)])
+    areas = 0.5 * (readings[1:] + readings[:-1]) * np.diff(t_padded)[:, None]
+    sums = np.concatenate([np.zeros((1, 7)), np.cumsum(areas, 0)])
+    # A gap's indicator is a step, not a straight line: kept as a sum alone.
+    lost = np.where(np.append(gaps, np.zeros(pad, bool))[:-1], np.diff(t_padded), 0.0)
+    sums[:, 6] = np.append(0.0, np.cumsum(lost))
+
+    epochs, velocity, std = _epochs(recording, start)
+    inside = (epochs - delay >= 0) & (epochs - delay <= t[-1])
+    if inside.sum() < 3:
+        raise ValueError(
+            f"recording {recording.name!r}: {inside.sum()} GNSS velocities lie within the time of the IMU and 3 are "
+            "needed; are the streams on one clock?"
+        )
+    epochs, velocity, std = epochs[inside], velocity[inside], std[inside]
+    spacing = float(np.clip(np.median(np.diff(epochs)), usual, 1.0))
+    instant, row = _with_instants_between(epochs, t[-1] + delay, delay, spacing)
+    delayed = np.ones(instant.size)
+    # What lies before the first and after the last epoch stands on the IMU's clock.
+    before, after = instant < epochs[0], instant > epochs[-1]
+    instant = np.where(before | after, instant - delay, instant)
+    delayed[before | after] = 0.0
+    there = row >= 0
+    v_gnss = np.where(there[:, None], velocity[row], 0.0)
+    std = np.where(there[:, None], std[row], np.inf)
+    more = -instant.size % _INSTANTS
+    longest = float(np.max(np.diff(np.where(delayed > 0, instant - delay, instant))))
+    steps = int(np.ceil(longest / usual / _STEPS)) * _STEPS
+    arrays = MotionReadings(
+        t=jnp.asarray(t_padded),
+        readings=jnp.asarray(readings),
+        sums=jnp.asarray(sums),
+        instant=jnp.asarray(np.append(instant, np.full(more, t[-1]))),
+        delayed=jnp.asarray(np.append(delayed, np.zeros(more))),
+        v_gnss=jnp.asarray(np.concatenate([v_gnss, np.zeros((more, 3))])),
+        std=jnp.asarray(np.concatenate([std, np.full((more, 3), np.inf)])),
+        spacing=jnp.asarray(spacing),
+        gravity=jnp.asarray(gravity_at(recording)),
+    )
+    return arrays, steps
+
+
+def _epochs(recording: Recording, start: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, velocities and standard deviations of the epochs that have a horizontal velocity."""
+    if recording.gnss is None:
+        raise ValueError(
+            f"recording {recording.name!r} has no GNSS velocities, which estimate_motion needs (wheel speeds have no "
+            "direction): add a gnss.csv with v_e, v_n or speed, course"
+        )
+    gnss = recording.gnss.dropna(subset=["v_e", "v_n"])
+    velocity = gnss[_VELOCITY].to_numpy(float)
+    std = np.full(velocity.shape, _VELOCITY_STD)
+    for axis, name in enumerate(("sd_e", "sd_n", "sd_u")):
+        if name in gnss:
+            stated = gnss[name].to_numpy(float)
+            usable = np.isfinite(stated) & (stated > 0)
+            if usable.any():
+                std[:, axis] = np.where(usable, stated, np.median(stated[usable]))
+    std = np.where(np.isfinite(velocity), std, np.inf)
+    return gnss.index.to_numpy(float) - start, np.nan_to_num(velocity), std
+
+
+def _with_instants_between(
+    epochs: np.ndarray, end: float, begin: float, spacing: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """The epochs, and instants that leave no interval longer than about `spacing`; the row of each, -1 for those."""
+    first = [begin] if epochs[0] - begin > 1e-6 else []
+    last = [end] if end - epochs[-1] > 1e-6 else []
+    known = np.concatenate([first, epochs, last])
+    rows = np.concatenate([[-1] * len(first), np.arange(epochs.size), [-1] * len(last)]).astype(int)
+    instants, chosen = [known[:1]], [rows[:1]]
+    for a, b, row in zip(known[:-1], known[1:], rows[1:], strict=True):
+        parts = max(1, int(np.ceil((b - a) / spacing - 0.5)))
+        instants.append(np.linspace(a, b, parts + 1)[1:])
+        chosen.append(np.append(np.full(parts - 1, -1), row))
+    return np.concatenate(instants), np.concatenate(chosen)

@@ -1,0 +1,218 @@
+"""Most probable motion of a whole record: Gauss-Newton over all instants, and the likelihood of the noise levels.
+
+One pass linearises about a trajectory, filters forward and smooths backward; the passes end at the trajectory of
+largest posterior probability. The innovations of a last pass give the likelihood of noise levels and delay (Laplace's
+approximation), by which they are chosen.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+
+from altijax import _safe
+from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
+from altijax.motion_estimate.model import (
+    STATES,
+    MotionNoise,
+    Trajectory,
+    motion_measurements,
+    motion_transitions,
+    moved,
+    preintegrated_intervals,
+)
+from altijax.motion_estimate.state_smoother import filter_states, likelihood_gradients, smooth_states
+
+# A velocity more than so many standard deviations from what all others say is trusted that much less.
+_GATE = 4.0
+_LONGEST_TURN = 0.7
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class MotionPrior:
+    """What is believed of the first instant and of the constants, and the trust in each measurement.
+
+    Attributes
+    ----------
+    covariance : (18, 18)
+        Of the states; zero for those that do not exist.
+    doubt : (time, 3)
+        Factor on the variance of each velocity, 1 but for outliers.
+    course : ()
+        1 where body x is held near the direction of travel, 0 where not.
+    """
+
+    covariance: jax.Array
+    doubt: jax.Array
+    course: jax.Array
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class MotionFit:
+    """A trajectory and its errors.
+
+    Attributes
+    ----------
+    trajectory : Trajectory
+        States at each instant.
+    covariance : (time, 18, 18)
+        Of the error state.
+    log_likelihood : ()
+        Of the noise levels and the delay, about the trajectory the pass began with.
+    by_noise : MotionNoise
+        Its derivative by each level.
+    by_delay : () 1/s
+        Its derivative by the delay.
+    doubt : (time, 3)
+        Factor by which outliers' variances should grow.
+    surprise : (time, 3)
+        Each velocity against what all others say, in standard deviations; zero where there is none.
+    step : () rad
+        Largest turn of the pass.
+    """
+
+    trajectory: Trajectory
+    covariance: jax.Array
+    log_likelihood: jax.Array
+    by_noise: MotionNoise
+    by_delay: jax.Array
+    doubt: jax.Array
+    surprise: jax.Array
+    step: jax.Array
+
+
+def motion_pass(
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    prior: MotionPrior,
+    noise: MotionNoise,
+    delay: jax.Array,
+    steps: int,
+) -> MotionFit:
+    """One step of Gauss-Newton from a trajectory, and the likelihood about it with its gradient.
+
+    Parameters
+    ----------
+    readings : MotionReadings
+        IMU readings and GNSS velocities.
+    trajectory : Trajectory
+        Where to linearise.
+    prior : MotionPrior
+        What is believed beforehand.
+    noise : MotionNoise
+        Noise levels.
+    delay : () s
+        How late the receiver's stamps are.
+    steps : int
+        Steps of each interval.
+
+    Returns
+    -------
+    fit : MotionFit
+        The next trajectory, covariance and likelihood.
+    """
+
+    def model(noise: MotionNoise, delay: jax.Array) -> dict[str, jax.Array]:
+        return _linearised(readings, trajectory, prior, noise, delay, steps)
+
+    linear, pull_back = jax.vjp(model, noise, delay)
+    filtered = filter_states(**linear)
+    x, P = smooth_states(linear["F"], linear["H"], filtered)
+    gradients = likelihood_gradients(linear["F"], linear["H"], filtered)
+    by_noise, by_delay = pull_back(gradients | {"H": jnp.zeros_like(linear["H"])})
+    surprise, doubt = _against_all_others(x, P, linear["z"], linear["R"], prior.doubt, jnp.isfinite(readings.std))
+    turn = _safe.norm(x[:, :3])
+    # Far from the truth a step may be longer than the linear model reaches.
+    shorten = jnp.minimum(1, _LONGEST_TURN / jnp.maximum(turn, 1e-9))
+    return MotionFit(
+        trajectory=moved(trajectory, x.at[:, :3].multiply(shorten[:, None])),
+        covariance=P,
+        log_likelihood=jnp.sum(filtered.log_likelihood),
+        by_noise=by_noise,
+        by_delay=by_delay,
+        doubt=doubt,
+        surprise=surprise,
+        step=jnp.max(turn),
+    )
+
+
+def motion_between(
+    readings: MotionReadings, trajectory: Trajectory, delay: jax.Array, steps: int
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """Attitude and velocity at the steps between the instants of a trajectory.
+
+    Readings lead from each instant; by how much they miss the next is spread evenly over the interval, which is the
+    mean of a random walk between two known ends.
+
+    Parameters
+    ----------
+    readings : MotionReadings
+        IMU readings.
+    trajectory : Trajectory
+        States at the instants.
+    delay : () s
+        How late the receiver's stamps are.
+    steps : int
+        Steps of each interval.
+
+    Returns
+    -------
+    t : (intervals, steps) s
+        Time of the end of each step.
+    C_nb : (intervals, steps, 3, 3)
+        Attitude.
+    v_n : (intervals, steps, 3) m/s
+        Velocity.
+    gained : (intervals, 3) m/s
+        Integral of the specific force over each interval, navigation axes.
+    """
+    instants = instants_at(readings, delay)
+    intervals = intervals_between(readings, instants, steps)
+    preintegrated, _ = preintegrated_intervals(trajectory, intervals)
+    share = (jnp.arange(steps) + 1) / steps
+    later = share * intervals.duration[:, None]
+    C = trajectory.C_nb[:-1, None]
+    gained = jnp.einsum("kij,ktj->kti", trajectory.C_nb[:-1], preintegrated.velocity)
+    v = trajectory.v_n[:-1, None] + gained - later[..., None] * readings.gravity * jnp.array([0.0, 0.0, 1.0])
+    miss = trajectory.v_n[1:] - v[:, -1]
+    return instants[:-1, None] + later, C @ preintegrated.C, v + share[:, None] * miss[:, None], gained[:, -1]
+
+
+def _linearised(
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    prior: MotionPrior,
+    noise: MotionNoise,
+    delay: jax.Array,
+    steps: int,
+) -> dict[str, jax.Array]:
+    t = instants_at(readings, delay)
+    intervals = intervals_between(readings, t, steps)
+    F, c, Q = motion_transitions(trajectory, intervals, noise, readings.gravity)
+    factor = jnp.stack([jnp.asarray(x, t.dtype) for x in (noise.horizontal, noise.horizontal, noise.vertical)])
+    there = jnp.isfinite(readings.std)
+    variance = jnp.where(there, (factor * jnp.where(there, readings.std, 1)) ** 2 * prior.doubt, jnp.inf)
+    used = there[:, 0] & (prior.course > 0)
+    course_variance = jnp.where(used, noise.course**2 / readings.spacing, jnp.inf)
+    z, H, R = motion_measurements(trajectory, readings.v_gnss, variance, course_variance)
+    # Constants and biases are believed to be zero before the first measurement; attitude and velocity can be anything.
+    first = jnp.concatenate([trajectory.accelerometer_bias[0], trajectory.gyro_bias[0], trajectory.constants])
+    x0 = jnp.zeros(STATES, t.dtype).at[6:].set(-first)
+    return {"F": F, "c": c, "Q": Q, "z": z, "H": H, "R": R, "x0": x0, "P0": prior.covariance}
+
+
+def _against_all_others(
+    x: jax.Array, P: jax.Array, z: jax.Array, R: jax.Array, doubt: jax.Array, there: jax.Array
+) -> tuple[jax.Array, jax.Array]:
+    """Each velocity against the estimate without it, by its nominal variance, and the doubt that follows."""
+    R = R[:, :3]
+    predicted = jnp.diagonal(P, axis1=-2, axis2=-1)[:, 3:6]
+    residual = z[:, :3] - x[:, 3:6]
+    # Taking one measurement out of an estimate is a division by the share of its variance that it left.
+    left = jnp.maximum(R - predicted, 1e-6 * R)
+    alone, variance = residual * R / left, predicted * R / left
+    surprise = jnp.where(there, alone / jnp.sqrt(variance + R / doubt), 0)
+    needed = (alone / _GATE) ** 2 - variance
+    return surprise, jnp.where(there & (jnp.abs(surprise) > _GATE), jnp.maximum(needed / (R / doubt), 1), 1)

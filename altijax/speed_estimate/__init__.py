@@ -1,0 +1,1 @@
+"""Speed of a recorded drive through outages: the state model, the filter, and the outage protocol."""

@@ -1,0 +1,271 @@
+"""Speed through curves without aid: a Kalman filter that takes the lateral equation as a measurement.
+
+Where [us20060293826] solves the lateral equation f_y = w_z v + g cos(pitch) sin(roll) for the roll and lets errors feed
+on themselves, here it is a noisy measurement of a speed and a roll that both have their own uncertainty: turning then
+tells the speed. The constants of the sensors and of their mounting are states, learned for as long as a speed is given.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+from jax.typing import ArrayLike
+
+from altijax import _safe
+from altijax._shapes import require_shape
+from altijax.speed_estimate.model import (
+    STATES,
+    SpeedNoise,
+    Step,
+    measurements,
+    model_of,
+    state_names,
+    total_roll,
+    walks,
+)
+
+_GATE, _SIGNIFICANT = 3.0, 3.0
+# What no vehicle on wheels does keeps a filter that lost its way within numbers.
+_LARGEST = {"speed": 300.0, "lateral_speed": 300.0, "vertical_speed": 300.0, "pitch": 1.4, "roll": 1.5}
+_LARGEST |= {"travel_yaw": 1.0, "travel_pitch": 1.0}
+_UNLIKELY = 30.0
+# Steps over which the rates are taken to be steady where their noise must not count.
+_SLOW = 11
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class SpeedTrack:
+    """What `filter_speed` found, at the end of each step.
+
+    Attributes
+    ----------
+    speed : (time,) m/s
+        Speed of the vehicle, never negative.
+    speed_std : (time,) m/s
+        Its standard deviation.
+    pitch : (time,) rad
+        Pitch of the IMU.
+    roll : (time,) rad
+        Roll of the IMU.
+    states : (time, states)
+        All states, named by `state_names`.
+    states_std : (time, states)
+        Their standard deviations.
+    log_likelihood : (time,)
+        Of each step's measurements, given all before.
+    """
+
+    speed: jax.Array
+    speed_std: jax.Array
+    pitch: jax.Array
+    roll: jax.Array
+    states: jax.Array
+    states_std: jax.Array
+    log_likelihood: jax.Array
+
+
+def filter_speed(
+    f_b: ArrayLike,
+    w_b: ArrayLike,
+    vibration: ArrayLike,
+    still: ArrayLike,
+    aid_speed: ArrayLike,
+    aid_acceleration: ArrayLike,
+    aid_lead: ArrayLike,
+    aided: ArrayLike,
+    speed0: ArrayLike,
+    pitch0: ArrayLike,
+    gravity: ArrayLike,
+    dt: ArrayLike,
+    noise: SpeedNoise | None = None,
+    sensors: str = "2+2",
+) -> SpeedTrack:
+    """Speed by an extended Kalman filter over the constants of the sensors and their mounting.
+
+    The readings are means over steps that are short against the car's manoeuvres and long against its vibration: 0.2 s
+    serves. With four or five sensors ``pitch' = -w_y cos(roll) + w_z sin(roll)`` and ``v' = f_x - g sin(pitch)``, as in
+    [us20060293826]_; ``f_y = w_z v + g cos(pitch) sin(roll)`` is measured with noise. Without a roll gyro the car is
+    taken to turn about its own upright axis, which on a slope exchanges pitch for roll, and the rest of the roll to
+    wander about a mean. With six sensors the IMU's velocity is carried along its own axes, and the point that does not
+    slip has neither lateral nor vertical speed. Of the aid only the speed is used. A measurement beyond 3 standard
+    deviations counts as one of a larger error. Where the vehicle stands, its speed and rates are zero. Where the aid
+    has shown that the vehicle shakes the more the faster it is, the vibration is a measurement of the speed.
+
+    Parameters
+    ----------
+    f_b : (time, 3) m/s^2
+        Mean specific force in each step; the third is used with six sensors.
+    w_b : (time, 3) rad/s
+        Mean angular rate; the first is used with a roll gyro.
+    vibration : (time,) rad^2/s^2
+        Mean square of what is fast in w_y: it rectifies into a bias of it.
+    still : (time,)
+        Not zero where the vehicle certainly stands.
+    aid_speed : (time,) m/s
+        Speed from a wheel or a satellite receiver.
+    aid_acceleration : (time,) m/s^2
+        Its rate of change, which serves to shift it in time.
+    aid_lead : (time,) s
+        Its time less that of the end of the step.
+    aided : (time,)
+        Not zero where there is one; elsewhere its values do not matter.
+    speed0 : () m/s
+        Speed at the start, known to 1 m/s.
+    pitch0 : () rad
+        Pitch at the start, known to 0.1 rad.
+    gravity : () m/s^2
+        Magnitude of gravity.
+    dt : () s
+        Duration of a step.
+    noise : SpeedNoise, optional
+        Noise levels; `fit_speed_noise` finds those of a drive.
+    sensors : {"2+2", "2+3", "6"}, optional
+        Accelerometers + gyros to use.
+
+    Returns
+    -------
+    track : SpeedTrack
+        Speed, attitude and all states with their standard deviations at the end of each step.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit or `sensors` is unknown.
+    """
+    f_b = require_shape("f_b", f_b, (None, 3))
+    time, dtype = f_b.shape[0], f_b.dtype
+    names = state_names(sensors)
+    w_b = require_shape("w_b", w_b, (time, 3))
+    series = {
+        "vibration": vibration,
+        "still": still,
+        "aid_speed": aid_speed,
+        "aid_acceleration": aid_acceleration,
+        "aid_lead": aid_lead,
+        "aided": aided,
+    }
+    given = {name: require_shape(name, value, (time,)).astype(dtype) for name, value in series.items()}
+    has_aid = given["aided"] != 0
+    scalars = {"speed0": speed0, "pitch0": pitch0, "gravity": gravity, "dt": dt}
+    speed0, pitch0, gravity, dt = (require_shape(name, value, ()).astype(dtype) for name, value in scalars.items())
+    noise = jax.tree.map(lambda level: jnp.asarray(level, dtype), SpeedNoise() if noise is None else noise)
+    before, after = jnp.concatenate([w_b[:1], w_b[:-1]]), jnp.concatenate([w_b[1:], w_b[-1:]])
+    steps = Step(
+        f_b=f_b,
+        w_b=w_b,
+        w_end=0.5 * (w_b + after),
+        w_slow=_moving_mean(w_b, _SLOW),
+        w_dot=(after - before) / (2 * dt),
+        vibration=given["vibration"],
+        still=given["still"] != 0,
+        aid_speed=jnp.where(has_aid, given["aid_speed"], 0),
+        aid_acceleration=jnp.where(has_aid, given["aid_acceleration"], 0),
+        aid_lead=jnp.where(has_aid, given["aid_lead"], 0),
+        aided=has_aid,
+    )
+    index = {name: number for number, name in enumerate(names)}
+    gain = index["vibration_gain"]
+    rates, observe, travel_speed = model_of(sensors)
+
+    def named(x: jax.Array) -> dict[str, jax.Array]:
+        return dict(zip(names, x, strict=True))
+
+    def slope(x: jax.Array, step: Step) -> jax.Array:
+        found = rates(named(x), step, gravity, noise)
+        return jnp.stack([found.get(name, jnp.zeros((), dtype)) for name in names])
+
+    def advance(x: jax.Array, step: Step) -> jax.Array:
+        return x + dt * slope(x + dt / 2 * slope(x, step), step)
+
+    def expected(x: jax.Array, step: Step) -> jax.Array:
+        middle = x - dt / 2 * slope(x, step)
+        return jnp.stack(observe(named(x), named(middle), rates(named(x), step, gravity, noise), step, gravity))
+
+    def proceed(carry: tuple[jax.Array, jax.Array], step: Step) -> tuple:
+        x, P = carry
+        # The noise of the gyros times the speed drives the velocities: gains that knew it would pull the speed down.
+        steady = step._replace(w_b=step.w_slow, w_end=step.w_slow) if sensors == "6" else step
+        F = jax.jacfwd(advance)(x, steady)
+        G = jax.jacfwd(lambda w_b: slope(x, step._replace(w_b=w_b)))(step.w_b)
+        walk = walks(named(x), step, noise, sensors)
+        gyros = noise.rotation**2 + noise.vibration**2 * step.vibration
+        x, P = advance(x, step), F @ P @ F.T + dt * (jnp.diag(walk) + gyros * G @ G.T)
+        # learned while aided, and of use only where that has shown that the car shakes the more the faster it is
+        shaken = x[gain] > _SIGNIFICANT * _safe.sqrt(P[gain, gain])
+        linearised_at, y0, H = x, expected(x, step), jax.jacfwd(expected)(x, step)
+        measured = [jnp.stack(column) for column in zip(*measurements(step, noise, sensors, shaken), strict=True)]
+
+        def measure(carry: tuple[jax.Array, jax.Array], one: tuple[jax.Array, ...]) -> tuple:
+            x, P = carry
+            h, y0, value, std, valid = one
+            x, P, log_likelihood = _update(x, P, h, value - y0 - h @ (x - linearised_at), std, valid)
+            return (x, P), log_likelihood
+
+        log_likelihood: jax.Array
+        (x, P), log_likelihood = jax.lax.scan(measure, (x, P), (H, y0, *measured))
+        x, P = jnp.clip(x, -largest, largest), _bounded(P, largest)
+        backward = jnp.minimum(travel_speed(named(x), step), 0)
+        direction = jax.grad(lambda x: travel_speed(named(x), step))(x)
+        x = x.at[jnp.asarray(moved)].add(-backward * direction[jnp.asarray(moved)])
+        state = (
+            jnp.maximum(travel_speed(named(x), step), 0),
+            _safe.sqrt(direction @ P @ direction),
+            x[index["pitch"]],
+            total_roll(named(x), step),
+            x,
+            _safe.sqrt(jnp.diagonal(P)),
+            jnp.sum(log_likelihood),
+        )
+        return (x, P), state
+
+    moved = [index[name] for name in ("speed", "lateral_speed", "vertical_speed") if name in index]
+    largest = jnp.asarray([_LARGEST.get(name, _UNLIKELY * STATES[name]) for name in names], dtype)
+    at_rest = {"speed": speed0, "pitch": pitch0}
+    x0 = jnp.stack([at_rest.get(name, jnp.zeros((), dtype)) for name in names])
+    roll0 = jnp.clip((f_b[0, 1] - speed0 * w_b[0, 2]) / gravity, -0.5, 0.5)
+    for name in {"roll", "resting_roll"} & set(names):
+        x0 = x0.at[index[name]].set(roll0)
+    P0 = jnp.diag(jnp.asarray([STATES[name] ** 2 for name in names], dtype))
+    found: tuple[jax.Array, ...]
+    _, found = jax.lax.scan(proceed, (x0, P0), steps)
+    return SpeedTrack(
+        speed=found[0],
+        speed_std=found[1],
+        pitch=found[2],
+        roll=found[3],
+        states=found[4],
+        states_std=found[5],
+        log_likelihood=found[6],
+    )
+
+
+def _bounded(P: jax.Array, largest: jax.Array) -> jax.Array:
+    """Covariance whose standard deviations are at most `largest`, and no correlation beyond 1 for rounding."""
+    std = _safe.sqrt(jnp.diagonal(P))
+    shrink = jnp.where(std > largest, largest / jnp.where(std > largest, std, 1), 1)
+    bound = jnp.outer(shrink * std, shrink * std)
+    return jnp.clip(shrink[:, None] * P * shrink, -bound, bound)
+
+
+def _moving_mean(series: jax.Array, width: int) -> jax.Array:
+    """Mean of `width` (an odd number) neighbours in time, the ends held."""
+    held = jnp.pad(series, ((width // 2, width // 2), (0, 0)), mode="edge")
+    return jnp.mean(jnp.stack([held[k : k + series.shape[0]] for k in range(width)]), axis=0)
+
+
+def _update(
+    x: jax.Array, P: jax.Array, h: jax.Array, innovation: jax.Array, std: jax.Array, valid: jax.Array
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """One measurement, its error inflated beyond the gate; and its log-likelihood, Huber's."""
+    Ph = P @ h
+    # rounding may take the first term below zero
+    expected_variance = jnp.maximum(h @ Ph, 0) + std * std
+    ratio = jnp.abs(innovation) / jnp.sqrt(expected_variance)
+    variance = expected_variance * jnp.maximum(ratio / _GATE, 1)
+    gain = jnp.where(valid, Ph / variance, 0)
+    # Joseph's form multiplied out for one measurement: right to first order for a rounded gain, and symmetric
+    cross = jnp.outer(gain, Ph)
+    P = P - cross - cross.T + variance * jnp.outer(gain, gain)
+    loss = jnp.where(ratio < _GATE, 0.5 * ratio * ratio, _GATE * ratio - 0.5 * _GATE * _GATE)
+    return x + gain * innovation, P, jnp.where(valid, -0.5 * jnp.log(expected_variance) - loss, 0)

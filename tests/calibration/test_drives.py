@@ -1,0 +1,78 @@
+"""A drive's calibration recovers what was simulated, says what a straight road hides, and agrees with real delays."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from altijax.calibration.drives import calibrate_drive, calibrate_stretches, drive_stretches
+from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, town_drive
+from altijax.doppler import DopplerReceiver
+from altijax.instruments import MEMS_ACCELEROMETER, MEMS_GYRO
+from altijax.recordings import read_recording
+from altijax.sensors import Accelerometer, Gyro
+
+TRUTH = np.array([1.013, -0.03, 0.16, 0.2, -0.15, 0.1, 0.996, 0.004, -0.006, 0.005, 0.06, -0.03])
+DENSITY = {"gyro": float(MEMS_GYRO.noise_density), "accelerometer": float(MEMS_ACCELEROMETER.noise_density)}
+record = jax.jit(
+    lambda readings, key: recorded_drive(
+        readings,
+        TRUTH,
+        accelerometer=Accelerometer(noise_density=MEMS_ACCELEROMETER.noise_density),
+        gyro=Gyro(noise_density=MEMS_GYRO.noise_density),
+        receiver=DopplerReceiver(rate=10.0, horizontal_noise=0.05, vertical_noise=0.1),
+        wheel_noise=0.03,
+        epochs=3000,
+        key=key,
+    )
+)
+drive = jax.jit(lambda manoeuvres: town_drive(manoeuvres, jnp.arange(30001) / 100, 9.80665))
+
+
+def test_five_minutes_with_turns() -> None:
+    calibration = calibrate_stretches(drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665, DENSITY))
+    table = calibration.table
+    error = np.abs(table["value"] - TRUTH)
+    limits = {"wheel_scale": 1e-3, "gnss_delay": 5e-3, "wheel_delay": 5e-3}
+    limits |= {f"accelerometer_bias_{axis}": 5e-3 for axis in "xy"}
+    limits |= {"mounting_pitch": np.radians(0.2), "mounting_yaw": np.radians(0.2)}
+    for name, limit in limits.items():
+        assert error[name] < limit, (name, error[name])
+    assert np.all(error < 4 * table["std"])
+    assert calibration.noise["GNSS horizontal"] == pytest.approx(0.05, rel=0.15)
+    # the same drive on a straight road without hills: a tilt looks like a bias
+    straight = drive(replace(Manoeuvres(), turning=0.0, slope=0.0))
+    hidden = calibrate_stretches(drive_stretches(record(straight, jax.random.key(1)), 9.80665, DENSITY))
+    assert hidden.table["std"]["accelerometer_bias_y"] > 20 * table["std"]["accelerometer_bias_y"]
+    assert "accelerometer_bias_y" in str(hidden)
+    assert np.all(np.abs(hidden.table["value"] - TRUTH) < 4 * hidden.table["std"])
+
+
+def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
+    with pytest.warns(UserWarning, match="magnetometer"):
+        recording = read_recording(data_dir / "comma2k19-example")
+    calibration = calibrate_drive(recording)
+    value, std = calibration.table["value"], calibration.table["std"]
+    assert value["gnss_delay"] == pytest.approx(0.16, abs=0.04)
+    assert value["wheel_delay"] == pytest.approx(-0.03, abs=0.04)
+    # The reference has 1.0087 over the whole path; the receiver's own speeds are what it is fitted to.
+    assert value["wheel_scale"] == pytest.approx(1.0087, abs=2e-3)
+    assert std["wheel_scale"] < 1e-3
+    part = calibrate_drive(recording, until=41.0)
+    assert list(part.held_out.columns) == ["nominal", "fitted", "worse"]
+    assert part.held_out.loc["wheel", "fitted"] < part.held_out.loc["wheel", "nominal"]
+
+
+def test_mistakes_are_named(data_dir: Path) -> None:
+    with pytest.raises(ValueError, match="shorter than a stretch of 21 s"):
+        zeros = np.zeros((50, 3))
+        t = np.arange(50) / 10
+        drive_stretches({"t": t, "f": zeros, "w": zeros, "t_gnss": t, "v_gnss": zeros, "t_wheel": t, "wheel": t}, 9.8)
+    with pytest.raises(ValueError, match="lacks a stream"):
+        calibrate_drive(read_recording(data_dir / "umn-thor75"))
+    stretches = drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665)
+    with pytest.raises(ValueError, match="parameters must be different names out of wheel_scale"):
+        calibrate_stretches(stretches, ["wheel_size"])

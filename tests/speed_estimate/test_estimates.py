@@ -1,0 +1,88 @@
+"""Speed of recordings: what comes out, that nothing after the aid's end is used, and what a real drive makes of it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import jax
+import numpy as np
+import pandas as pd
+import pytest
+
+from altijax.datasets import load_dataset
+from altijax.recordings import Recording, RecordingWarning
+from altijax.speed_estimate.estimates import NOMINAL_NOISE, SPEED_METHODS, estimate_speed, fit_noise
+from altijax.speed_estimate.steps import drive_in_steps, initial_state
+from tests.made_drives import curvy_recording
+
+COLUMNS = ["speed", "speed_std", "pitch", "roll", "valid"]
+
+
+@pytest.fixture(scope="module")
+def drive() -> Recording:
+    return curvy_recording()
+
+
+@pytest.mark.parametrize("method", SPEED_METHODS)
+def test_one_finite_row_a_sample(drive: Recording, method: str) -> None:
+    estimate = estimate_speed(drive, method=method, aid_until=20.0)
+    assert list(estimate.columns) == COLUMNS
+    assert estimate.index.equals(drive.imu.index)
+    assert np.isfinite(estimate[COLUMNS[:4]].to_numpy()).all() and estimate["valid"].dtype == bool
+    truth = 10 + 3 * np.sin(0.25 * (estimate.index - 5))
+    assert (estimate["speed"] - truth).loc[12.0:20.0].abs().max() < 0.15
+    assert estimate["speed_std"].loc[21.0:].min() > estimate["speed_std"].loc[19.0:20.0].max()
+
+
+@pytest.mark.parametrize("method", SPEED_METHODS)
+def test_the_aid_after_its_end_and_the_reference_are_never_used(drive: Recording, method: str) -> None:
+    """The leak test: garbage in their place changes nothing."""
+    wheel = drive.wheel.copy()
+    wheel.loc[wheel.index > 20.0, "speed"] = np.random.default_rng(2).uniform(0, 90, (wheel.index > 20.0).sum())
+    reference = pd.DataFrame({"v_e": [77.0, -3.0], "v_n": [0.0, 50.0]}, index=pd.Index([5.0, 40.0], name="t"))
+    spoiled = replace(drive, wheel=wheel, reference=reference)
+    cut = replace(drive, wheel=drive.wheel[:20.0])
+    estimate = estimate_speed(drive, method=method, aid_until=20.0)
+    pd.testing.assert_frame_equal(estimate_speed(spoiled, method=method, aid_until=20.0), estimate, check_exact=True)
+    pd.testing.assert_frame_equal(estimate_speed(cut, method=method, aid_until=20.0), estimate, check_exact=True)
+
+
+def test_without_an_end_the_aid_serves_for_the_first_second(drive: Recording) -> None:
+    cut = replace(drive, wheel=drive.wheel[:6.0])
+    pd.testing.assert_frame_equal(estimate_speed(drive), estimate_speed(cut, aid_until=6.0), check_exact=True)
+
+
+def test_initial_values_replace_the_aid(drive: Recording) -> None:
+    alone = replace(drive, wheel=None)
+    with pytest.raises(ValueError, match="give initial_speed"):
+        estimate_speed(alone)
+    estimate = estimate_speed(alone, initial_speed=10.0, initial_pitch=0.0)
+    assert estimate["speed"].iloc[0] == pytest.approx(10.0, abs=0.5)
+    assert abs(estimate["pitch"].iloc[0]) < 0.05
+
+
+def test_noise_levels_are_those_of_the_drive(drive: Recording) -> None:
+    with jax.enable_x64(True):
+        steps = drive_in_steps(drive, None, 20.0)
+        found = fit_noise(steps, 39.0, "2+3", initial_state(steps, 40.0, None, None), NOMINAL_NOISE)
+    # two readings of 0.02 m/s in each step
+    assert found["aid"] == pytest.approx(0.014, rel=0.4)
+    assert found["acceleration"] < 0.5 * NOMINAL_NOISE["acceleration"]
+
+
+def test_wrong_options_are_named(drive: Recording) -> None:
+    with pytest.raises(ValueError, match="method must be one of conventional"):
+        estimate_speed(drive, method="magic")
+    with pytest.raises(ValueError, match="sensors must be one of auto"):
+        estimate_speed(drive, sensors="3+3")
+    with pytest.raises(ValueError, match="has no gyro"):
+        estimate_speed(replace(drive, imu=drive.imu[["ax", "ay", "az"]]))
+    with pytest.raises(ValueError, match="has no IMU"):
+        estimate_speed(replace(drive, imu=None))
+
+
+def test_the_highway_is_bridged_for_forty_seconds(data_dir: Path) -> None:
+    with pytest.warns(RecordingWarning, match="magnetometer_uncalibrated"):
+        recording = load_dataset("comma2k19-example")
+    for method in ("conventional", "roll", "filter"):
+        estimate = estimate_speed(recording, method=method, aid_until=20.0)
+        assert abs(estimate["speed"].iloc[-1] - recording.wheel["speed"].iloc[-1]) < 2.0, method

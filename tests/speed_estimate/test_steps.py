@@ -1,0 +1,85 @@
+"""Recordings in steps: means, vibration, standstills, calibrations, and the aid up to its end."""
+
+from dataclasses import replace
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from altijax.calibration.records import Calibration
+from altijax.recordings import Recording
+from altijax.speed_estimate.steps import STEP, drive_in_steps, initial_state, steps_until
+from tests.made_drives import curvy_recording
+
+
+@pytest.fixture(scope="module")
+def drive() -> Recording:
+    return curvy_recording()
+
+
+def calibration(**values: float) -> Calibration:
+    named = pd.Series(values)
+    empty = pd.DataFrame()
+    return Calibration(method="slope", values=named, std=0 * named, correlation=empty, absorbed=empty, held_out=empty)
+
+
+def test_steps_are_means_of_the_readings(drive: Recording) -> None:
+    steps = drive_in_steps(drive, None, 20.0)
+    t = steps.ends - STEP / 2
+    np.testing.assert_allclose(steps.f_steps[:, 0], 0.75 * np.cos(0.25 * t) + 0.1, atol=0.1)
+    assert np.mean(steps.w_steps[:, 1]) == pytest.approx(0.003, abs=2e-4)
+    # of white noise of 0.002 rad/s a little less than its square is fast
+    assert np.mean(steps.vibration) == pytest.approx(0.002**2, rel=0.15)
+
+
+def test_the_aid_ends_where_it_should(drive: Recording) -> None:
+    inputs = steps_until(drive_in_steps(drive, None, 20.0), 20.0)
+    ends = STEP * np.arange(1, inputs["aided"].size + 1)
+    assert inputs["aided"][ends <= 20.0].all() and not inputs["aided"][ends > 20.0].any()
+
+
+def test_a_standing_car_is_seen(drive: Recording) -> None:
+    imu = drive.imu.copy()
+    standing = imu.index > 35.0
+    imu.loc[standing] = [0.1, -0.05, 9.81, 0.0, 0.003, -0.002]
+    still = steps_until(drive_in_steps(replace(drive, imu=imu), None, 20.0), 20.0)["still"]
+    assert not still[: round(29 / STEP)].any() and still[round(32 / STEP) :].all()
+
+
+def test_a_calibration_is_used_whole_or_refused(drive: Recording) -> None:
+    plain = drive_in_steps(drive, None, 20.0)
+    known = drive_in_steps(
+        drive,
+        calibration(accelerometer_bias_x=0.1, accelerometer_scale_y=1.01, wheel_scale=1.02, wheel_delay=0.3),
+        20.0,
+    )
+    np.testing.assert_allclose(known.f_b, plain.f_b / [1, 1.01, 1] - [0.1, 0, 0], rtol=1e-12)
+    np.testing.assert_allclose(known.aid, 1.02 * plain.aid)
+    np.testing.assert_allclose(known.t_aid, plain.t_aid - 0.3)
+    tilted = drive_in_steps(drive, calibration(mounting_pitch=0.1), 20.0)
+    # nose up on the car: a level car reads part of gravity forward
+    np.testing.assert_allclose(tilted.f_b[:, 0], plain.f_b @ [np.cos(0.1), 0, -np.sin(0.1)], rtol=1e-12)
+    np.testing.assert_allclose(tilted.w_b[:, 1], plain.w_b[:, 1])
+    with pytest.raises(ValueError, match="initial_vertical_speed of the calibration means nothing for a speed"):
+        drive_in_steps(drive, calibration(initial_vertical_speed=0.1), 20.0)
+
+
+def test_a_late_aid_does_not_serve_beyond_its_end(drive: Recording) -> None:
+    late = drive_in_steps(drive, calibration(wheel_delay=0.3), 20.0)
+    inputs = steps_until(late, 20.0)
+    assert not inputs["aided"][STEP * np.arange(inputs["aided"].size) > 19.8].any()
+
+
+def test_the_initial_state_is_that_of_the_first_second(drive: Recording) -> None:
+    speed, pitch = initial_state(drive_in_steps(drive, None, 20.0), 20.0, None, None)
+    assert speed == pytest.approx(10.4, abs=0.2)
+    assert pitch == pytest.approx(0.1 / 9.81, abs=0.02)
+    assert initial_state(drive_in_steps(drive, None, 20.0), 20.0, 3.0, 0.2) == (3.0, 0.2)
+
+
+def test_gravity_is_that_of_the_places_so_far(drive: Recording) -> None:
+    index = pd.Index([5.0, 15.0, 30.0], name="t")
+    places = pd.DataFrame({"lat": [45.8, 45.8, 80.0], "v_e": 10.0, "v_n": 0.0}, index=index)
+    gravity = drive_in_steps(replace(drive, gnss=places), None, 20.0).gravity
+    assert gravity == drive_in_steps(replace(drive, gnss=places[:15.0]), None, 20.0).gravity
+    assert gravity == pytest.approx(9.807, abs=0.001)
