@@ -11,6 +11,7 @@ from altijax.constants import STANDARD_GRAVITY
 from altijax.motions import ideal_readings, road_pose
 from altijax.recordings import Recording
 from altijax.roads import SpeedProfile, winding_road
+from altijax.rotations import matrix_to_euler, yaw_to_heading
 
 jax.config.update("jax_enable_x64", True)
 
@@ -45,7 +46,9 @@ def exact_drive(start: float = 0.0) -> Recording:
     speed = np.asarray(truth.speed)
     wheel = pd.DataFrame({"speed": speed, "left": speed - half, "right": speed + half}, index=index)
     gnss = pd.DataFrame(np.asarray(truth.velocity), index=index, columns=["v_e", "v_n", "v_u"])
-    reference = pd.DataFrame({"alt": 500 + np.asarray(truth.position[:, 2])}, index=index)
+    euler = np.asarray(matrix_to_euler(truth.C_nb))
+    attitude = {"roll": euler[:, 0], "pitch": euler[:, 1], "heading": np.asarray(yaw_to_heading(euler[:, 2]))}
+    reference = gnss.assign(alt=500 + np.asarray(truth.position[:, 2]), **attitude)
     return Recording(
         name="exact", imu=imu, wheel=wheel[::2], gnss=gnss[::10], reference=reference[::5], track_width=TRACK_WIDTH
     )

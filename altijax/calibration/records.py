@@ -1,91 +1,252 @@
-"""Constants fitted to a reference: the record of them, and what an estimate may take them for."""
+"""A calibration: constants, how well they are known, and whether they help; as a table, and as a TOML file."""
 
+import json
+import re
+import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
+from os import PathLike
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from altijax.drives import Drive
-from altijax.elevation_estimate.model import NOMINAL, PARAMETERS, elevation, uncertain_constants
-from altijax.elevation_estimate.posterior import Constants
+from altijax.calibration.parameters import PARAMETERS
+
+# Less than this is no difference worth a word.
+_WORSE = 1.01
+_TABLE = ("value", "std", "unit", "prior", "prior_std")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Calibration:
-    """Constants fitted to a reference, how well they are known, and whether they help where they were not fitted.
+    """Constants found from recordings, how well they are known, and whether they help where they were not fitted.
 
     Attributes
     ----------
     method : str
-        Method whose misfit was minimised.
-    values, std : Series
-        Value and standard deviation by parameter name.
+        Method whose misfit was minimised, or "drive" where the sensors were made to agree.
+    table : DataFrame
+        One row a constant: value, std (from data and prior), unit, prior (its mean), prior_std, and shift, by how many
+        standard deviations of the prior the value has moved.
     correlation : DataFrame
-        Correlation between the parameters.
+        Correlation between the constants.
     absorbed : DataFrame
-        By how much each value moves if one of the constants left at nominal (columns) is off by one unit.
+        By how much each value moves if one of the constants left at nominal (columns) is off by one unit; empty where
+        that is not known.
+    undetermined : tuple of str
+        In words, what the data do not determine, and which combinations of the same constants they do.
     held_out : DataFrame
-        One row a recording: last time used, and the misfit (RMS, its offset removed) with nominal and with fitted
-        constants, on what was fitted and on what was held out; NaN where nothing was.
+        One row a recording and quantity: its unit, the first and the last time that was fitted (``start``, ``until``)
+        and the last one that was held out (``end``), in s on the recording's time axis; the root mean square misfit
+        with nominal and with fitted constants on both parts, NaN where there was nothing; and whether the constants
+        made it worse, by more than 1 %, where they were not fitted.
     """
 
     method: str
-    values: pd.Series
-    std: pd.Series
+    table: pd.DataFrame
     correlation: pd.DataFrame
     absorbed: pd.DataFrame
+    undetermined: tuple[str, ...]
     held_out: pd.DataFrame
 
-    def _table(self) -> pd.DataFrame:
-        return pd.DataFrame(
-            {"value": self.values, "std": self.std, "unit": PARAMETERS["unit"].reindex(self.values.index)}
-        )
+    @property
+    def values(self) -> pd.Series:
+        """Value by name."""
+        return self.table["value"]
+
+    @property
+    def std(self) -> pd.Series:
+        """Standard deviation by name."""
+        return self.table["std"]
+
+    @property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the constants."""
+        return self.correlation * np.outer(self.std, self.std)
+
+    @property
+    def std_with_absorbed(self) -> pd.Series:
+        """Standard deviation by name where the constants that were left at nominal may be off as `PARAMETERS` says."""
+        presumed = PARAMETERS["uncertainty"].reindex(self.absorbed.columns).to_numpy(float)
+        taken_up = np.square(self.absorbed.to_numpy(float) * presumed).sum(1)
+        return np.sqrt(self.std**2 + pd.Series(taken_up, self.absorbed.index).reindex(self.std.index, fill_value=0.0))
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Write the calibration as a TOML file, from which `load` gets the same numbers, to the last digit.
+
+        Parameters
+        ----------
+        path : path
+            File to write; one that exists is replaced.
+        """
+        lines = ["# Calibration by AltiJAX: true = measured / scale - bias; see altijax.Calibration"]
+        lines += [_line("method", self.method), _line("undetermined", list(self.undetermined))]
+        for name, row in self.table.iterrows():
+            lines += ["", f"[constants.{_key(str(name))}]", *(_line(key, row[key]) for key in _TABLE)]
+        for title, frame in (("correlation", self.correlation), ("absorbed", self.absorbed)):
+            lines += ["", f"[{title}]", _line("columns", list(frame.columns))]
+            lines += [_line(str(name), row.tolist()) for name, row in frame.iterrows()]
+        for name, row in self.held_out.iterrows():
+            lines += ["", "[[held_out]]", _line("recording", name), *(_line(str(key), row[key]) for key in row.index)]
+        Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> "Calibration":
+        """The calibration that `save` wrote.
+
+        Parameters
+        ----------
+        path : path
+            TOML file.
+
+        Returns
+        -------
+        calibration : Calibration
+            The same.
+
+        Raises
+        ------
+        ValueError
+            If the file is not TOML or lacks a part of a calibration.
+        """
+        try:
+            found = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            constants = found["constants"]
+            rows = {name: [constants[name][key] for key in _TABLE] for name in constants}
+            matrices = {title: found[title] for title in ("correlation", "absorbed")}
+            frames = {
+                title: pd.DataFrame(
+                    [matrix[name] for name in constants if name in matrix],
+                    index=[name for name in constants if name in matrix],
+                    columns=matrix["columns"],
+                    dtype=float,
+                )
+                for title, matrix in matrices.items()
+            }
+            return cls(
+                method=found["method"],
+                table=constants_table(pd.DataFrame.from_dict(rows, orient="index", columns=list(_TABLE))),
+                undetermined=tuple(found["undetermined"]),
+                held_out=held_out_table(found.get("held_out", [])),
+                **frames,
+            )
+        except (tomllib.TOMLDecodeError, KeyError) as error:
+            raise ValueError(f"{path} is not a calibration that `Calibration.save` wrote: {error!r}") from error
 
     def __repr__(self) -> str:
-        return f"Calibration of {self.method!r}\n{self._table()}\n{self.held_out.T}"
+        parts = [f"Calibration of {self.method!r}", self.table.to_string(), *self.undetermined]
+        return "\n".join(
+            [*parts, *self._judgement(), self.held_out.T.to_string() if len(self.held_out) else ""]
+        ).strip()
 
     def _repr_html_(self) -> str:
-        title = f"<p>Calibration of <b>{self.method}</b>; RMS misfit where fitted and where held out</p>"
-        return title + self._table().to_html(border=0) + self.held_out.round(3).to_html(border=0)
+        parts = [f"<p>Calibration of <b>{self.method}</b></p>", self.table.to_html(border=0)]
+        parts += [f"<p>{sentence}</p>" for sentence in (*self.undetermined, *self._judgement())]
+        return "".join([*parts, self.held_out.round(4).to_html(border=0) if len(self.held_out) else ""])
+
+    def _judgement(self) -> list[str]:
+        if not len(self.held_out):
+            return []
+        worse = worse_where_held_out(self)
+        return [worse or "Root mean square misfit where fitted, up to `until`, and where held out, after it:"]
 
 
-def prior_constants(
-    drive: Drive, method: str, calibration: Calibration | None = None, fixed: dict[str, float] | None = None
-) -> Constants:
-    """What is known of a method's constants before a drive.
+def constants_table(table: pd.DataFrame) -> pd.DataFrame:
+    """The table of a `Calibration` from value, std, unit, prior and prior_std by name.
 
     Parameters
     ----------
-    drive : Drive
-        The drive.
-    method : {"shirai", "slope", "fused"}
-        The method.
-    calibration : Calibration, optional
-        Of any method; other constants are those of an instrument that nobody has calibrated.
-    fixed : dict of str to float, optional
-        Constants known exactly, which are left out.
+    table : DataFrame
+        With these columns.
 
     Returns
     -------
-    constants : Constants
-        A calibrated constant has taken up what the others, left at nominal, did where it was fitted: it is off by its
-        own error and, against each of them, by what it absorbed.
+    table : DataFrame
+        The same with the shift, its index called parameter.
     """
-    fixed = {} if fixed is None else fixed
-    values = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
-    names = [name for name in values if name not in fixed]
-    others = {name: std for name, std in uncertain_constants(drive, method).items() if name not in values | fixed}
-    covariance = np.diag(np.square([*np.zeros(len(names)), *others.values()]))
-    if calibration is not None:
-        std = calibration.std[names].to_numpy()
-        own = calibration.correlation.loc[names, names].to_numpy() * np.outer(std, std)
-        absorbed = calibration.absorbed if calibration.method == method else pd.DataFrame()
-        gain = absorbed.reindex(index=names, columns=list(others)).fillna(0.0).to_numpy()
-        through = np.vstack([gain, np.eye(len(others))])
-        covariance = through @ np.diag(np.square(list(others.values()))) @ through.T
-        covariance[: len(names), : len(names)] += own
-    mean = NOMINAL | values
-    if "initial_vertical_speed" in others:
-        mean["initial_vertical_speed"] = float(elevation({**values, **fixed}, drive, "shirai")["vertical_speed"][0])
-    order = (*names, *others)
-    return Constants(names=order, mean=np.array([mean[name] for name in order]), covariance=covariance)
+    table = table.loc[:, list(_TABLE)].astype(dict.fromkeys(("value", "std", "prior", "prior_std"), float))
+    return table.assign(shift=(table["value"] - table["prior"]) / table["prior_std"]).rename_axis("parameter")
+
+
+def worse_where_held_out(calibration: Calibration) -> str:
+    """A sentence on the quantities that the constants made worse where they were not fitted; empty if there is none."""
+    held_out = calibration.held_out
+    if not len(held_out) or not held_out["worse"].any():
+        return ""
+    rows = held_out[held_out["worse"]]
+    listed = ", ".join(
+        f"{row['quantity']} of {name!r} ({row['held_out_nominal']:.3g} to {row['held_out']:.3g} {row['unit']})"
+        for name, row in rows.iterrows()
+    )
+    return f"These constants make the estimate worse where they were not fitted: {listed}."
+
+
+def correct_imu(imu: pd.DataFrame, calibration: Calibration | None) -> pd.DataFrame:
+    """Readings of accelerometers and gyros without their calibrated biases and scales.
+
+    Parameters
+    ----------
+    imu : DataFrame
+        IMU stream of a recording.
+    calibration : Calibration, optional
+        Nothing is corrected without one.
+
+    Returns
+    -------
+    imu : DataFrame
+        true = measured / scale - bias; the same table where nothing is known of these.
+    """
+    known = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
+    changed = {}
+    for letter, sensor in (("a", "accelerometer"), ("g", "gyro")):
+        for axis in "xyz":
+            bias = known.get(f"{sensor}_bias_{axis}", 0.0)
+            scale = known.get(f"{sensor}_scale", 1.0) * known.get(f"{sensor}_scale_{axis}", 1.0)
+            if (bias, scale) != (0.0, 1.0) and f"{letter}{axis}" in imu:
+                changed[f"{letter}{axis}"] = imu[f"{letter}{axis}"] / scale - bias
+    return imu.assign(**changed)
+
+
+def held_out_row(
+    recording: str,
+    quantity: str,
+    unit: str,
+    interval: Sequence[float],
+    fitted: Sequence[float],
+    held_out: Sequence[float],
+) -> dict[str, str | float | bool]:
+    """A row of `Calibration.held_out`; `interval` is start, until and end, the misfits are nominal and fitted."""
+    return {
+        "recording": recording,
+        "quantity": quantity,
+        "unit": unit,
+        **dict(zip(("start", "until", "end"), map(float, interval), strict=True)),
+        **dict(zip(("fitted_nominal", "fitted"), map(float, fitted), strict=True)),
+        **dict(zip(("held_out_nominal", "held_out"), map(float, held_out), strict=True)),
+        "worse": bool(held_out[1] > _WORSE * held_out[0]),
+    }
+
+
+def held_out_table(rows: Sequence[dict[str, str | float | bool]]) -> pd.DataFrame:
+    """`Calibration.held_out` of such rows."""
+    return pd.DataFrame(rows).set_index("recording") if rows else pd.DataFrame()
+
+
+def _line(key: str, value: object) -> str:
+    return f"{_key(key)} = {_toml(value)}"
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _toml(key)
+
+
+def _toml(value: object) -> str:
+    """A TOML value; Python writes a float by the fewest digits that give it back."""
+    if isinstance(value, list):
+        return f"[{', '.join(map(_toml, value))}]"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False)
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    return repr(float(value))  # type: ignore[arg-type]

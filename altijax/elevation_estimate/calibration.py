@@ -1,7 +1,6 @@
 """Constants of the elevation methods, fitted to reference heights."""
 
-import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -10,67 +9,45 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.records import Calibration, prior_constants
+from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.records import Calibration, held_out_row, held_out_table
+from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
 from altijax.drives import Drive, drive_arrays, reference_heights, start_of
-from altijax.elevation_estimate.estimates import require_method
-from altijax.elevation_estimate.model import NOMINAL, PARAMETERS, UNCERTAINTY, elevation, uncertain_constants
-from altijax.elevation_estimate.posterior import Posterior, elevation_posterior
-from altijax.least_squares import Fit, levenberg_marquardt
+from altijax.elevation_estimate.model import NOMINAL, UNCERTAINTY, elevation, uncertain_constants
+from altijax.elevation_estimate.posterior import Constants, Posterior, elevation_posterior
+from altijax.elevation_estimate.priors import prior_constants
 from altijax.recordings import Recording
 
-# A direction of the parameters that the data see a hundred times less well than another.
-_BLIND = 1e-2
+Targets = list[tuple[jax.Array, jax.Array]]
 
 
-def calibrate(
-    recordings: Recording | Iterable[Recording],
-    parameters: str | Iterable[str],
-    *,
-    method: str,
-    until: float | None = None,
+def calibrate_elevation(
+    recordings: Sequence[Recording], names: Sequence[str], *, method: str, until: float | None = None
 ) -> Calibration:
-    """Constants that bring a method's estimate closest to the reference, in least squares.
+    """Constants that bring a method's elevations closest to reference heights, in least squares.
 
     Parameters
     ----------
-    recordings : Recording or several
-        With a reference of the quantity estimated (``alt``); the constants are common to them, a height offset is free
-        in each.
-    parameters : str or several
-        Names of `PARAMETERS`; the others keep their nominal values.
+    recordings : sequence of Recording
+        With ``alt`` in their reference; the constants are common to them, a height offset is free in each.
+    names : sequence of str
+        Constants to find; the others keep their nominal values.
     method : {"slope", "shirai", "fused"}
-        Method to calibrate. With "fused" the constants begin at their priors, and the noise of the drive is found
-        beside them.
+        With "fused" the noise of the drive is found beside the constants.
     until : float, optional
-        Last time, on the recordings' time axis, whose reference may be used; all of it by default. Afterwards the
-        reference only measures what the calibration is worth there (``held_out``).
+        Last time whose reference may be used.
 
     Returns
     -------
     calibration : Calibration
-        Values, standard deviations and correlations, and the misfit before and after. The standard deviations count
-        neighbouring residuals as one observation as far as they are correlated; drift slower than what was fitted is
-        not in them.
+        Drift slower than what was fitted is not in its standard deviations.
 
     Raises
     ------
     ValueError
-        If a name is unknown, a parameter changes nothing in this method, or the reference is missing or too short.
-
-    Warns
-    -----
-    UserWarning
-        If the data cannot tell some of the parameters apart.
+        If a constant changes nothing, or the reference is missing or too short.
     """
-    require_method(method)
-    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    names = [parameters] if isinstance(parameters, str) else list(parameters)
-    unknown = sorted(set(names) - set(PARAMETERS.index))
-    if unknown or not names or not recordings or len(set(names)) < len(names):
-        raise ValueError(
-            f"parameters must be different names out of {', '.join(PARAMETERS.index)}, for one recording or more; "
-            f"got {', '.join(names) or 'none'} for {len(recordings)} recording(s)"
-        )
+    names = list(names)
     if "initial_vertical_speed" in names and len(recordings) > 1:
         raise ValueError("initial_vertical_speed belongs to one recording: calibrate it on one alone")
     with jax.enable_x64(True):
@@ -84,45 +61,129 @@ def calibrate(
             )
         if method == "fused":
             return _calibrate_fused(recordings, drives, references, fitted, names)
-        targets = [(t[:n], heights[:n]) for (t, heights), n in zip(references, fitted, strict=True)]
-        others = [name for name in uncertain_constants(drives[0], method) if name not in names]
-        if len(drives) > 1:
-            others = [name for name in others if name != "initial_vertical_speed"]  # each recording has its own
-        fit, residuals, full_jacobian = _fit(drives, targets, tuple(names), tuple(others), method)
-        jacobian = np.asarray(full_jacobian)[:, : len(names)]
-        _require_effect(names, jacobian, method)
-        _warn_of_what_cannot_be_told_apart(names, jacobian)
-        covariance = np.asarray(fit.covariance) * _residual_variance(np.asarray(residuals), fitted)
-        constants = _named(fit.x, tuple(names))
+        prior = _prior(drives[0], names)
+        mean, unit = (jnp.asarray(prior.loc[names, column].to_numpy(float)) for column in ("nominal", "uncertainty"))
+        targets = [(jnp.asarray(t[:n]), jnp.asarray(h[:n])) for (t, h), n in zip(references, fitted, strict=True)]
+        static = {"names": tuple(names), "method": method}
+        first = _residuals(jnp.zeros(len(names)), drives, targets, mean, unit, **static)
+        fit = fit_to_reference(
+            lambda x, noise: _solve(x, noise, drives, targets, mean, unit, **static), len(names), first
+        )
+        constants = dict(zip(names, np.asarray(mean) + np.asarray(unit) * fit.x, strict=True))
         errors = [
             [np.asarray(_error(of, drive, target, method)) for of in ({}, constants)]
             for drive, target in zip(drives, references, strict=True)
         ]
-        held_out = _held_out(recordings, references, fitted, errors)
-    deviation = np.sqrt(np.diag(covariance))
-    absorbed = -np.linalg.lstsq(jacobian, np.asarray(full_jacobian)[:, len(names) :])[0]
-    units = PARAMETERS["uncertainty"]
-    return Calibration(
-        method=method,
-        values=pd.Series({name: float(value) for name, value in constants.items()}, name="value"),
-        std=units[names].rename("std") * deviation,
-        correlation=pd.DataFrame(covariance / np.outer(deviation, deviation), index=names, columns=names),
-        absorbed=pd.DataFrame(absorbed, names, others).mul(units[names], axis=0).div(units[others], axis=1),
-        held_out=held_out,
-    )
+        absorbed = _absorbed(drives, targets, constants, method, unit, fit.covariance, fit.noise)
+        return calibration_from(
+            method,
+            names,
+            fit.x,
+            fit.covariance,
+            _held_out(recordings, references, fitted, errors),
+            prior=prior,
+            absorbed=absorbed,
+        )
+
+
+def _prior(drive: Drive, names: Sequence[str]) -> pd.DataFrame:
+    """`PARAMETERS`, with what the drive itself says of its vertical speed at the start."""
+    if "initial_vertical_speed" not in names:
+        return PARAMETERS
+    climb = float(elevation({}, drive, "shirai")["vertical_speed"][0])
+    slope = uncertain_constants(drive, "shirai")["initial_vertical_speed"]
+    prior = PARAMETERS.copy()
+    std = np.hypot(slope, UNCERTAINTY["initial_vertical_speed"])
+    prior.loc["initial_vertical_speed", ["nominal", "uncertainty"]] = climb, std
+    return prior
+
+
+@partial(jax.jit, static_argnames=("names", "method"))
+def _residuals(
+    x: jax.Array,
+    drives: list[Drive],
+    targets: Targets,
+    mean: jax.Array,
+    unit: jax.Array,
+    names: tuple[str, ...],
+    method: str,
+) -> tuple[jax.Array, ...]:
+    """Errors without their mean, a group a recording."""
+    values = dict(zip(names, mean + unit * x, strict=True))
+    errors = [_error(values, drive, target, method) for drive, target in zip(drives, targets, strict=True)]
+    return tuple((error - jnp.mean(error))[None] for error in errors)
+
+
+@partial(jax.jit, static_argnames=("names", "method"))
+def _solve(
+    x0: jax.Array,
+    noise: jax.Array,
+    drives: list[Drive],
+    targets: Targets,
+    mean: jax.Array,
+    unit: jax.Array,
+    names: tuple[str, ...],
+    method: str,
+) -> Found:
+    return weighted_fit(lambda x: _residuals(x, drives, targets, mean, unit, names, method), x0, noise)
+
+
+def _absorbed(
+    drives: list[Drive],
+    targets: Targets,
+    constants: dict[str, float],
+    method: str,
+    unit: jax.Array,
+    covariance: np.ndarray,
+    noise: np.ndarray,
+) -> pd.DataFrame:
+    """By how much each constant moves for one unit of those left at nominal."""
+    names = list(constants)
+    others = [name for name in uncertain_constants(drives[0], method) if name not in names]
+    if len(drives) > 1:
+        others = [name for name in others if name != "initial_vertical_speed"]  # each recording has its own
+    start = NOMINAL | constants
+    if "initial_vertical_speed" in others:
+        start["initial_vertical_speed"] = float(elevation(constants, drives[0], method)["vertical_speed"][0])
+    both = (*names, *others)
+    units = np.append(np.asarray(unit), [UNCERTAINTY[name] for name in others])
+    at = jnp.asarray([start[name] for name in both])
+    slopes = _slopes(jnp.zeros(len(both)), drives, targets, at, jnp.asarray(units), names=both, method=method)
+    J = np.concatenate([np.asarray(slope)[0] / std for slope, std in zip(slopes, noise, strict=True)])
+    mine, theirs = J[:, : len(names)], J[:, len(names) :]
+    moved = -covariance @ mine.T @ theirs
+    return pd.DataFrame(moved * units[: len(names), None] / units[len(names) :], names, others)
+
+
+@partial(jax.jit, static_argnames=("names", "method"))
+def _slopes(
+    x: jax.Array,
+    drives: list[Drive],
+    targets: Targets,
+    mean: jax.Array,
+    unit: jax.Array,
+    names: tuple[str, ...],
+    method: str,
+) -> tuple[jax.Array, ...]:
+    return jax.jacfwd(lambda x: _residuals(x, drives, targets, mean, unit, names, method))(x)
 
 
 def _calibrate_fused(
-    recordings: list[Recording],
+    recordings: Sequence[Recording],
     drives: list[Drive],
     references: list[tuple[np.ndarray, np.ndarray]],
     fitted: list[int],
     names: list[str],
 ) -> Calibration:
     """One drive after the other, each beginning with what the ones before have left."""
-    idle = [name for name in names if name not in uncertain_constants(drives[0], "fused")]
+    first = prior_constants(drives[0], "fused")
+    idle = [name for name in names if name not in first.names]
     if idle:
         raise ValueError(f"{', '.join(idle)}: not a constant of method 'fused' on these recordings; leave it out")
+    prior = PARAMETERS.copy()
+    rows = [first.names.index(name) for name in names]
+    prior.loc[names, "nominal"] = first.mean[rows]
+    prior.loc[names, "uncertainty"] = np.sqrt(np.diag(first.covariance))[rows]
 
     def after(drive: Drive, calibration: Calibration | None, known: tuple | None) -> Posterior:
         return elevation_posterior(drive, prior_constants(drive, "fused", calibration), "fused", known)
@@ -130,22 +191,7 @@ def _calibrate_fused(
     calibration = None
     for drive, (t, heights), n in zip(drives, references, fitted, strict=True):
         constants = after(drive, calibration, (t[:n], heights[:n])).constants
-        # Each drive has its own vertical speed at the start; the other constants are nominal in the calibration.
-        others = [x for x in constants.names if x not in (*names, "initial_vertical_speed")]
-        pick, rest = ([constants.names.index(x) for x in group] for group in (names, others))
-        across = constants.covariance[np.ix_(rest, pick)]
-        absorbed = np.linalg.solve(constants.covariance[np.ix_(rest, rest)], across).T
-        nominal = np.array([NOMINAL[name] for name in others])
-        covariance = constants.covariance[np.ix_(pick, pick)] - absorbed @ across
-        std = np.sqrt(np.diag(covariance))
-        calibration = Calibration(
-            method="fused",
-            values=pd.Series(constants.mean[pick] + absorbed @ (nominal - constants.mean[rest]), names, name="value"),
-            std=pd.Series(std, names, name="std"),
-            correlation=pd.DataFrame(covariance / np.outer(std, std), names, names),
-            absorbed=pd.DataFrame(absorbed, names, others),
-            held_out=pd.DataFrame(),
-        )
+        calibration = _with_others_nominal(constants, names, prior)
     assert calibration is not None  # there is at least one drive
     errors = [
         [np.interp(t, drive.t, after(drive, of, None).series["elevation"]) - heights for of in (None, calibration)]
@@ -154,59 +200,44 @@ def _calibrate_fused(
     return replace(calibration, held_out=_held_out(recordings, references, fitted, errors))
 
 
+def _with_others_nominal(constants: Constants, names: list[str], prior: pd.DataFrame) -> Calibration:
+    """The constants named, if those left out are nominal; what they absorb of these says the rest."""
+    # Each drive has its own vertical speed at the start.
+    others = [x for x in constants.names if x not in (*names, "initial_vertical_speed")]
+    pick, rest = ([constants.names.index(x) for x in group] for group in (names, others))
+    across = constants.covariance[np.ix_(rest, pick)]
+    absorbed = np.linalg.solve(constants.covariance[np.ix_(rest, rest)], across).T
+    nominal = np.array([NOMINAL[name] for name in others])
+    covariance = constants.covariance[np.ix_(pick, pick)] - absorbed @ across
+    mean = constants.mean[pick] + absorbed @ (nominal - constants.mean[rest])
+    units = prior.loc[names, "uncertainty"].to_numpy(float)
+    return calibration_from(
+        "fused",
+        names,
+        (mean - prior.loc[names, "nominal"].to_numpy(float)) / units,
+        covariance / np.outer(units, units),
+        pd.DataFrame(),
+        prior=prior,
+        absorbed=pd.DataFrame(absorbed, names, others),
+    )
+
+
 def _held_out(
-    recordings: list[Recording],
+    recordings: Sequence[Recording],
     references: list[tuple[np.ndarray, np.ndarray]],
     fitted: list[int],
     errors: list[list[np.ndarray]],
 ) -> pd.DataFrame:
-    """Misfit on what was fitted and on the rest, for errors with nominal and with fitted constants."""
+    """Misfit, its mean removed, on what was fitted and on the rest, with nominal and with fitted constants."""
     rows = []
-    for recording, (t, _), n, (nominal, best) in zip(recordings, references, fitted, errors, strict=True):
-        rest = n < nominal.size
-        rows.append(
-            {
-                "recording": recording.name,
-                "until": t[n - 1] + start_of(recording),
-                "fitted_nominal": np.std(nominal[:n]),
-                "fitted": np.std(best[:n]),
-                "held_out_nominal": np.std(nominal[n:]) if rest else np.nan,
-                "held_out": np.std(best[n:]) if rest else np.nan,
-            }
+    for recording, (t, _), n, pair in zip(recordings, references, fitted, errors, strict=True):
+        before, after = (
+            (np.std(nominal), np.std(best)) if nominal.size else (np.nan, np.nan)
+            for nominal, best in ([e[:n] for e in pair], [e[n:] for e in pair])
         )
-    return pd.DataFrame.from_records(rows, index="recording")
-
-
-def _named(x: jax.Array, names: tuple[str, ...]) -> dict[str, jax.Array]:
-    """Constants by name, from their deviations from nominal in units of their uncertainty."""
-    return {name: NOMINAL.get(name, 0.0) + UNCERTAINTY[name] * x[i] for i, name in enumerate(names)}
-
-
-@partial(jax.jit, static_argnames=("names", "others", "method"))
-def _fit(
-    drives: list[Drive],
-    targets: list[tuple[jax.Array, jax.Array]],
-    names: tuple[str, ...],
-    others: tuple[str, ...],
-    method: str,
-) -> tuple[Fit, jax.Array, jax.Array]:
-    """Least squares over all drives, with residuals and Jacobian (by `names`, then `others`) at the minimum."""
-
-    def residuals(values: dict[str, jax.Array]) -> jax.Array:
-        errors = [_error(values, drive, target, method) for drive, target in zip(drives, targets, strict=True)]
-        return jnp.concatenate([error - jnp.mean(error) for error in errors])
-
-    fit = levenberg_marquardt(lambda x: residuals(_named(x, names)), jnp.zeros(len(names)))
-    best = _named(fit.x, names)
-    if "initial_vertical_speed" in others:
-        best["initial_vertical_speed"] = elevation(best, drives[0], method)["vertical_speed"][0]
-    start = NOMINAL | best
-    both = names + others
-
-    def around_best(y: jax.Array) -> jax.Array:
-        return residuals({name: start[name] + UNCERTAINTY[name] * y[i] for i, name in enumerate(both)})
-
-    return fit, residuals(best), jax.jacfwd(around_best)(jnp.zeros(len(both)))
+        interval = np.array([t[0], t[n - 1], t[-1]]) + start_of(recording)
+        rows.append(held_out_row(recording.name, "elevation", "m", interval.tolist(), before, after))
+    return held_out_table(rows)
 
 
 @partial(jax.jit, static_argnames="method")
@@ -214,34 +245,3 @@ def _error(values: dict[str, jax.Array], drive: Drive, target: tuple[jax.Array, 
     """Estimate less reference at the reference's times."""
     t, heights = target
     return jnp.interp(t, drive.t, elevation(values, drive, method)["elevation"]) - heights
-
-
-def _residual_variance(residuals: np.ndarray, counts: Sequence[int]) -> float:
-    """Variance of the residuals, times the number of neighbours that count as one for their correlation."""
-    together = 0.0
-    for part in np.split(residuals, np.cumsum(counts)[:-1]):
-        n = part.size
-        spectrum = np.abs(np.fft.rfft(part, 2 * n)) ** 2
-        correlation = np.fft.irfft(spectrum)[:n] / max(float(part @ part), np.finfo(float).tiny)
-        first_zero = int(np.argmax(correlation <= 0)) or n
-        together += n * (2 * correlation[:first_zero].sum() - 1)
-    return float(residuals @ residuals) / residuals.size * together / residuals.size
-
-
-def _require_effect(names: list[str], jacobian: np.ndarray, method: str) -> None:
-    idle = [name for name, column in zip(names, jacobian.T, strict=True) if not column.any()]
-    if idle:
-        raise ValueError(f"{', '.join(idle)}: changes nothing in method {method!r} on these recordings; leave it out")
-
-
-def _warn_of_what_cannot_be_told_apart(names: list[str], jacobian: np.ndarray) -> None:
-    """Name the parameters that a nearly blind direction mixes."""
-    _, singular, directions = np.linalg.svd(jacobian / np.linalg.norm(jacobian, axis=0), full_matrices=False)
-    for value, direction in zip(singular, directions, strict=True):
-        if value < _BLIND * singular[0]:
-            mixed = [name for name, part in zip(names, direction, strict=True) if abs(part) > 0.3]
-            warnings.warn(
-                f"these data hardly tell {' and '.join(mixed)} apart: a combination of them is determined, the single "
-                "values are not; leave one out",
-                stacklevel=3,
-            )

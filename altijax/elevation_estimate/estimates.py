@@ -7,10 +7,11 @@ import numpy as np
 import pandas as pd
 
 from altijax import metrics
-from altijax.calibration.records import Calibration, prior_constants
+from altijax.calibration.records import Calibration
 from altijax.drives import drive_arrays, imu_of, reference_heights, start_of
 from altijax.elevation_estimate.model import ELEVATION_METHODS
 from altijax.elevation_estimate.posterior import elevation_posterior
+from altijax.elevation_estimate.priors import prior_constants, with_corrected_yaw_gyro
 from altijax.recordings import Recording
 
 
@@ -60,7 +61,8 @@ def estimate_elevation(
     require_method(method)
     known = None if known_heights is None else _known_heights(known_heights, recording)
     with jax.enable_x64(True):
-        drive, grid = drive_arrays(recording, turns=method != "slope")
+        corrected = with_corrected_yaw_gyro(recording, calibration)
+        drive, grid = drive_arrays(corrected, turns=method != "slope")
         fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
         found = elevation_posterior(
             drive, prior_constants(drive, method, calibration, fixed), method, known, fixed

@@ -5,40 +5,15 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-import pandas as pd
 
 from altijax.altitude import elevation_by_norm, elevation_by_slope, horizontal_distance
+from altijax.calibration.parameters import PARAMETERS
 from altijax.drives import Drive
 from altijax.rotations import euler_to_matrix
 from altijax.sensors import Accelerometer, correct_accelerometer
 from altijax.signals import cumulative_integral, resample
 
 ELEVATION_METHODS = ("shirai", "slope", "fused")
-
-PARAMETERS = pd.DataFrame.from_dict(
-    {
-        "accelerometer_bias_x": (0.0, 0.3, "m/s^2"),
-        "accelerometer_bias_y": (0.0, 0.3, "m/s^2"),
-        "accelerometer_bias_z": (0.0, 0.3, "m/s^2"),
-        "accelerometer_scale": (1.0, 0.01, "1"),
-        "accelerometer_scale_x": (1.0, 0.01, "1"),
-        "accelerometer_scale_y": (1.0, 0.01, "1"),
-        "accelerometer_scale_z": (1.0, 0.01, "1"),
-        "mounting_pitch": (0.0, 0.05, "rad"),
-        "mounting_yaw": (0.0, 0.05, "rad"),
-        "lever_arm": (0.0, 1.0, "m"),
-        "weight_transfer": (0.0, 0.05, "1"),
-        "yaw_rate_bias": (0.0, 0.005, "rad/s"),
-        "wheel_scale": (1.0, 0.01, "1"),
-        "wheel_delay": (0.0, 0.1, "s"),
-        "gnss_delay": (0.0, 0.1, "s"),
-        "initial_vertical_speed": (np.nan, 0.2, "m/s"),
-    },
-    orient="index",
-    columns=["nominal", "uncertainty", "unit"],
-)
-"""Constants that can be calibrated: nominal value (NaN: found by the method itself); by how much a consumer's sensor,
-as mounted, may be off (assumed: it scales the fit, and is the error bar of what was not calibrated); unit."""
 
 NOMINAL = {str(name): float(value) for name, value in PARAMETERS["nominal"].dropna().items()}
 UNCERTAINTY = {str(name): float(value) for name, value in PARAMETERS["uncertainty"].items()}

@@ -1,5 +1,6 @@
 """Attitude and velocity at every IMU sample of a recording, from accelerometer, gyro and GNSS Doppler velocities."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
 from functools import partial
 
@@ -10,7 +11,7 @@ import pandas as pd
 from scipy.optimize import minimize
 from scipy.spatial.transform import Rotation, Slerp
 
-from altijax.calibration.records import Calibration
+from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import imu_of, start_of
 from altijax.motion_estimate.intervals import MotionReadings, instants_at
 from altijax.motion_estimate.model import MotionNoise, Trajectory
@@ -48,6 +49,17 @@ _WINDOW_WITHOUT_GYRO = 5.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class _Beliefs:
+    """Standard deviations of constants, by axis, and mean and standard deviation of the delay if it was calibrated."""
+
+    accelerometer_bias: np.ndarray
+    accelerometer_scale: np.ndarray
+    gyro_bias: np.ndarray
+    gyro_scale: np.ndarray
+    delay: tuple[float, float] | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class _Batch:
     """What a search has found so far."""
 
@@ -55,6 +67,7 @@ class _Batch:
     prior: MotionPrior
     noise: MotionNoise
     delay: float
+    delay_prior: tuple[float, float]
     objective: float
 
 
@@ -79,7 +92,9 @@ def estimate_motion(
         "batch" is the most probable motion of the whole record, with biases, noise levels and delay from the record
         itself, and the only one whose error bars include all of these.
     calibration : Calibration, optional
-        Constants known beforehand: accelerometer and gyro biases, `gnss_delay`.
+        Constants known beforehand: biases and scales of accelerometers and gyros, `gnss_delay`. In "batch" they and
+        their errors are the priors of what it estimates itself; a bias found from heights also holds the mounting, and
+        is trusted accordingly less. Constants of wheels and mounting have no say in the attitude of the IMU.
     use_gyro : bool
         Whether the gyro is used where there is one.
     wind : bool or "auto"
@@ -105,28 +120,39 @@ def estimate_motion(
         raise ValueError(f"method must be one of {', '.join(MOTION_METHODS)}, got {method!r}")
     if wind not in (True, False, "auto"):
         raise ValueError(f'wind must be True, False or "auto", got {wind!r}')
-    recording = _corrected(recording, calibration)
-    if delay is None and calibration is not None and "gnss_delay" in calibration.values:
-        delay = float(calibration.values["gnss_delay"])
+    beliefs = _beliefs(calibration)
+    recording = replace(recording, imu=correct_imu(imu_of(recording), calibration))
     use_gyro = use_gyro and method != "epoch" and "gx" in imu_of(recording)
     with jax.enable_x64(True):
         if method == "batch":
-            return _batch_estimate(recording, use_gyro, wind, delay)
+            return _batch_estimate(recording, *_found_batch(recording, use_gyro, wind, delay, beliefs))
+        if delay is None and beliefs.delay is not None:
+            delay = beliefs.delay[0]
         return _window_estimate(recording, method, use_gyro, delay)
 
 
-def _corrected(recording: Recording, calibration: Calibration | None) -> Recording:
-    if calibration is None:
-        return recording
-    imu = imu_of(recording).copy()
-    for triad, sensor in (("a", "accelerometer"), ("g", "gyro")):
-        for axis in "xyz":
-            column = triad + axis
-            if column in imu:
-                common = calibration.values.get(f"{sensor}_scale", 1.0)
-                scale = calibration.values.get(f"{sensor}_scale_{axis}", common)
-                imu[column] = imu[column] / scale - calibration.values.get(f"{sensor}_bias_{axis}", 0.0)
-    return replace(recording, imu=imu)
+def _beliefs(calibration: Calibration | None) -> _Beliefs:
+    """What the calibration knows, else what is presumed of a consumer's instrument."""
+    known: dict[str, float] = {}
+    if calibration is not None:
+        known = {str(name): float(std) for name, std in calibration.std_with_absorbed.items()}
+
+    def of(kind: str, presumed: float) -> np.ndarray:
+        return np.array([known.get(f"{kind}_{axis}", presumed) for axis in "xyz"])
+
+    # A bias calibrated on a drive has taken up what the scale does to gravity.
+    alone = np.array([f"accelerometer_bias_{axis}" not in known for axis in "xyz"])
+    delay = None
+    if calibration is not None and "gnss_delay" in known:
+        delay = float(calibration.values["gnss_delay"]), known["gnss_delay"]
+    return _Beliefs(
+        accelerometer_bias=of("accelerometer_bias", _ACCELEROMETER_BIAS_STD),
+        accelerometer_scale=alone
+        * of("accelerometer_scale", known.get("accelerometer_scale", _ACCELEROMETER_SCALE_STD)),
+        gyro_bias=of("gyro_bias", _GYRO_BIAS_STD),
+        gyro_scale=of("gyro_scale", _GYRO_SCALE_STD),
+        delay=delay,
+    )
 
 
 def _window_estimate(recording: Recording, method: str, use_gyro: bool, delay: float | None) -> pd.DataFrame:
@@ -156,12 +182,13 @@ def _window_estimate(recording: Recording, method: str, use_gyro: bool, delay: f
     return estimate
 
 
-def _batch_estimate(recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None) -> pd.DataFrame:
-    first = _DELAY if delay is None else delay
-    readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=first)
-    if delay is None and use_gyro:
-        first = _delay_by_windows(readings, steps)
-    batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first)
+def _found_batch(
+    recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None, beliefs: _Beliefs
+) -> tuple[_Batch, MotionReadings, int]:
+    first = delay if delay is not None else _DELAY if beliefs.delay is None else beliefs.delay[0]
+    if delay is None and use_gyro and beliefs.delay is None:
+        first = _delay_by_windows(*motion_readings(recording, use_gyro=use_gyro, delay=first))
+    batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first, beliefs)
     batch = _most_probable(readings, batch, steps, estimate_delay=delay is None)
     if wind == "auto" and not use_gyro and _turns_around(readings):
         with_wind = batch.prior.covariance.at[[16, 17], [16, 17]].set(_WIND_STD**2)
@@ -176,6 +203,10 @@ def _batch_estimate(recording: Recording, use_gyro: bool, wind: bool | str, dela
         # Ten in the logarithm pays for two more constants many times over; below 1 m/s a wind is a crooked mount.
         if batch.objective - windy.objective > 10 and np.hypot(*vector) > max(1.0, 4 * float(np.max(error))):
             batch = windy
+    return batch, readings, steps
+
+
+def _batch_estimate(recording: Recording, batch: _Batch, readings: MotionReadings, steps: int) -> pd.DataFrame:
     covariance = np.asarray(batch.fit.covariance)
     estimate = _at_samples(
         recording, readings, batch.fit.trajectory, covariance[:, :6, :6], batch.noise, batch.delay, steps
@@ -184,20 +215,65 @@ def _batch_estimate(recording: Recording, use_gyro: bool, wind: bool | str, dela
     return estimate
 
 
+def batch_with_constants(recording: Recording) -> Callable[[Calibration], pd.DataFrame]:
+    """The most probable motion as a function of constants, all else as it was found without them.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an accelerometer and GNSS velocities.
+
+    Returns
+    -------
+    motion : callable
+        From a `Calibration` to an estimate as that of `estimate_motion`; noise levels, outliers, and the delay where it
+        is none of the constants, stay. Call it in double precision.
+    """
+    use_gyro = "gx" in imu_of(recording)
+    found, readings, steps = _found_batch(recording, use_gyro, "auto", None, _beliefs(None))
+
+    def motion(calibration: Calibration) -> pd.DataFrame:
+        beliefs = _beliefs(calibration)
+        corrected = replace(recording, imu=correct_imu(imu_of(recording), calibration))
+        again = _corrected_readings(readings, calibration, use_gyro)
+        known = _prior_covariance(corrected, use_gyro, float(found.prior.course) > 0, False, beliefs)
+        covariance = found.prior.covariance.at[6:15, 6:15].set(known[6:15, 6:15])
+        batch = replace(
+            found,
+            prior=replace(found.prior, covariance=covariance),
+            delay=found.delay if beliefs.delay is None else beliefs.delay[0],
+        )
+        start = found.fit.trajectory
+        fit = _passes(again, start, batch.prior, batch.noise, batch.delay, steps, passes=4)
+        return _batch_estimate(corrected, replace(batch, fit=fit), again, steps)
+
+    return motion
+
+
+def _corrected_readings(readings: MotionReadings, calibration: Calibration, use_gyro: bool) -> MotionReadings:
+    """The same as the readings of a corrected IMU, at the same instants."""
+    columns = [f"{sensor}{axis}" for sensor in "ag" for axis in "xyz"]
+    # Corrections are straight lines: two points show them.
+    offset, one = correct_imu(pd.DataFrame([np.zeros(6), np.ones(6)], columns=columns), calibration).to_numpy(float)
+    gain = np.append(one - offset, 1.0)
+    offset = np.append(offset, 0.0) * np.append(np.ones(3), np.full(4, float(use_gyro)))
+    return replace(
+        readings,
+        readings=readings.readings * gain + offset,
+        sums=readings.sums * gain + offset * (readings.t - readings.t[0])[:, None],
+    )
+
+
 def _first_batch(
-    recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None, first: float
+    recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None, first: float, beliefs: _Beliefs
 ) -> tuple[_Batch, MotionReadings, int]:
     """The best of several starts: turned about the vertical with a gyro, by several delays without."""
     noise = _as_arrays(_WITH_GYRO if use_gyro else _WITHOUT_GYRO)
     course = not use_gyro or wind != "auto"
-    constants = [_GYRO_SCALE_STD if use_gyro else 0.0] * 3 + [_MOUNT_STD if course else 0.0]
-    constants += [_WIND_STD if wind is True else 0.0] * 2
-    std = [_ATTITUDE_STD] * 3 + [_VELOCITY_STD] * 3 + [_ACCELEROMETER_BIAS_STD] * 3
-    std += [_GYRO_BIAS_STD if use_gyro else _RATE_STD] * 3 + constants
-    covariance = np.diag(np.square(std))
-    force = imu_of(recording)[["ax", "ay", "az"]].to_numpy(float).mean(0)
-    covariance[6:9, 6:9] += _ACCELEROMETER_SCALE_STD**2 * np.outer(force, force)
-    delays = _DELAYS_WITHOUT_GYRO if delay is None and not use_gyro else (first,)
+    delay_prior = beliefs.delay or (_DELAY, _DELAY_STD)
+    covariance = _prior_covariance(recording, use_gyro, course, wind is True, beliefs)
+    search = delay is None and not use_gyro and beliefs.delay is None
+    delays = _DELAYS_WITHOUT_GYRO if search else (first,)
     turns = (0.0, 0.5, 1.0, 1.5) if use_gyro else (0.0,)
     best: tuple[_Batch, MotionReadings, int] | None = None
     for trial in delays:
@@ -212,12 +288,31 @@ def _first_batch(
         for turn in turns:
             C = jnp.asarray(Rotation.from_rotvec([0.0, 0.0, turn * np.pi]).as_matrix()) @ start.C_nb
             fit = _passes(readings, replace(start, C_nb=C), prior, noise, trial, steps, passes=5)
-            objective = -float(fit.log_likelihood) + 0.5 * ((trial - _DELAY) / _DELAY_STD) ** 2
+            objective = -float(fit.log_likelihood) + 0.5 * ((trial - delay_prior[0]) / delay_prior[1]) ** 2
             if best is None or objective < best[0].objective - 1.0:
-                batch = _Batch(fit=fit, prior=prior, noise=noise, delay=float(trial), objective=objective)
+                batch = _Batch(
+                    fit=fit,
+                    prior=prior,
+                    noise=noise,
+                    delay=float(trial),
+                    delay_prior=delay_prior,
+                    objective=objective,
+                )
                 best = batch, readings, steps
     assert best is not None
     return best
+
+
+def _prior_covariance(recording: Recording, use_gyro: bool, course: bool, wind: bool, beliefs: _Beliefs) -> np.ndarray:
+    """Of the states before anything is known of the drive."""
+    std = [_ATTITUDE_STD] * 3 + [_VELOCITY_STD] * 3 + [*beliefs.accelerometer_bias]
+    std += [*beliefs.gyro_bias, *beliefs.gyro_scale] if use_gyro else [_RATE_STD] * 3 + [0.0] * 3
+    std += [_MOUNT_STD if course else 0.0] + [_WIND_STD if wind else 0.0] * 2
+    covariance = np.diag(np.square(std))
+    force = imu_of(recording)[["ax", "ay", "az"]].to_numpy(float).mean(0)
+    by_scale = beliefs.accelerometer_scale * force
+    covariance[6:9, 6:9] += np.outer(by_scale, by_scale)
+    return covariance
 
 
 def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estimate_delay: bool) -> _Batch:
@@ -226,8 +321,8 @@ def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estim
     trajectory = batch.fit.trajectory
     names = [name for name in _LEVELS if name != "course" or float(prior.course) > 0]
     start = _WITH_GYRO if float(prior.covariance[12, 12]) > 0 else _WITHOUT_GYRO
-    nominal = np.append(np.log([float(getattr(start, name)) for name in names]), _DELAY)
-    spread = np.append([_WALK_SPREAD if name in _WALKS else _SPREAD for name in names], _DELAY_STD)
+    nominal = np.append(np.log([float(getattr(start, name)) for name in names]), batch.delay_prior[0])
+    spread = np.append([_WALK_SPREAD if name in _WALKS else _SPREAD for name in names], batch.delay_prior[1])
     objective = np.inf
     for turn in range(6):
         x0 = np.append(np.log([float(getattr(noise, name)) for name in names]), delay)
@@ -251,7 +346,7 @@ def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estim
         if settled:
             break
     fit = _passes(readings, trajectory, prior, noise, delay, steps, passes=8)
-    return _Batch(fit=fit, prior=prior, noise=noise, delay=delay, objective=objective)
+    return replace(batch, fit=fit, prior=prior, noise=noise, delay=delay, objective=objective)
 
 
 def _misfit(

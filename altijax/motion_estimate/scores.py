@@ -44,7 +44,7 @@ def score_motion(estimate: pd.DataFrame, recording: Recording) -> pd.DataFrame:
     names = [name for name in (*_ANGLES, *_VELOCITY) if name in reference and reference[name].notna().any()]
     if not names or t.size == 0:
         raise ValueError(f"recording {recording.name!r}: no valid sample of the estimate has a reference")
-    at = _interpolated(estimate, t)
+    at = estimate_at(estimate, t)
     rows, squares = {}, np.zeros(t.size)
     for name in names:
         error = at[name] - reference[name].to_numpy(float)
@@ -110,8 +110,8 @@ def _row(error: np.ndarray, std: np.ndarray) -> dict[str, float]:
     }
 
 
-def _interpolated(estimate: pd.DataFrame, t: np.ndarray) -> dict[str, np.ndarray]:
-    """The estimate at other times; attitudes on the group."""
+def estimate_at(estimate: pd.DataFrame, t: np.ndarray) -> dict[str, np.ndarray]:
+    """An estimate of the motion at other times: roll, pitch, heading and velocities; attitudes on the group."""
     # With y to the left the pitch of this convention is minus that of the rotation about y.
     angles = np.stack([np.pi / 2 - estimate["heading"], -estimate["pitch"], estimate["roll"]], -1)
     turned = Slerp(estimate.index.to_numpy(float), Rotation.from_euler("ZYX", angles))(t).as_euler("ZYX")

@@ -54,6 +54,8 @@ class SpeedTrack:
         Their standard deviations.
     log_likelihood : (time,)
         Of each step's measurements, given all before.
+    last_covariance : (states, states)
+        Covariance of the states after the last step.
     """
 
     speed: jax.Array
@@ -63,6 +65,7 @@ class SpeedTrack:
     states: jax.Array
     states_std: jax.Array
     log_likelihood: jax.Array
+    last_covariance: jax.Array
 
 
 def filter_speed(
@@ -80,6 +83,7 @@ def filter_speed(
     dt: ArrayLike,
     noise: SpeedNoise | None = None,
     sensors: str = "2+2",
+    states_std: ArrayLike | None = None,
 ) -> SpeedTrack:
     """Speed by an extended Kalman filter over the constants of the sensors and their mounting.
 
@@ -122,6 +126,9 @@ def filter_speed(
         Noise levels; `fit_speed_noise` finds those of a drive.
     sensors : {"2+2", "2+3", "6"}, optional
         Accelerometers + gyros to use.
+    states_std : array, optional
+        Standard deviation of each of `STATES` before the first sample, in their order, used or not: that of a
+        calibration, say. Their own values by default.
 
     Returns
     -------
@@ -226,9 +233,11 @@ def filter_speed(
     roll0 = jnp.clip((f_b[0, 1] - speed0 * w_b[0, 2]) / gravity, -0.5, 0.5)
     for name in {"roll", "resting_roll"} & set(names):
         x0 = x0.at[index[name]].set(roll0)
-    P0 = jnp.diag(jnp.asarray([STATES[name] ** 2 for name in names], dtype))
+    all_std = jnp.asarray(list(STATES.values()) if states_std is None else states_std, dtype)
+    all_std = require_shape("states_std", all_std, (len(STATES),))
+    P0 = jnp.diag(all_std[jnp.asarray([list(STATES).index(name) for name in names])] ** 2)
     found: tuple[jax.Array, ...]
-    _, found = jax.lax.scan(proceed, (x0, P0), steps)
+    (_, P), found = jax.lax.scan(proceed, (x0, P0), steps)
     return SpeedTrack(
         speed=found[0],
         speed_std=found[1],
@@ -237,6 +246,7 @@ def filter_speed(
         states=found[4],
         states_std=found[5],
         log_likelihood=found[6],
+        last_covariance=P,
     )
 
 

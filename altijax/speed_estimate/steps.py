@@ -7,10 +7,11 @@ import pandas as pd
 from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
-from altijax.calibration.records import Calibration
+from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import gravity_at, imu_of, start_of
-from altijax.elevation_estimate.model import PARAMETERS
 from altijax.recordings import Recording
+from altijax.speed_estimate.model import STATES
 
 STEP = 0.2
 """Duration of a step in s: long against a car's vibration and rocking, short against its manoeuvres."""
@@ -22,7 +23,9 @@ _VIBRATION_WINDOW = 0.5
 # while the aid said that it moved.
 _STILL_WINDOW, _STILL_FORCE, _STILL_RATE, _MOVING_SPEED = 2.0, 0.05, 0.004, 0.5
 
-_USED = set(PARAMETERS.index) - {"initial_vertical_speed"}
+_USED = set(PARAMETERS.index) - {"initial_vertical_speed", "lever_arm", "weight_transfer", "yaw_rate_bias"}
+# Of the states that a calibrated constant is the mean of.
+_MEANS = {"mounting_yaw": "travel_yaw", "mounting_pitch": "travel_pitch"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,6 +44,7 @@ class SpeedDrive:
     t_aid: np.ndarray
     aid: np.ndarray
     gravity: float
+    states_std: np.ndarray
 
 
 def drive_in_steps(recording: Recording, calibration: Calibration | None, until: float) -> SpeedDrive:
@@ -55,12 +59,10 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
             f"recording {recording.name!r} has no gyro, or less than {_SHORTEST} s of it: speed needs both"
         )
     values = _constants(calibration)
+    imu = correct_imu(imu, calibration)
     f_b, w_b = (imu[[f"{sensor}{axis}" for axis in "xyz"]].to_numpy(float) for sensor in "ag")
-    scale = np.array([values.get(f"accelerometer_scale_{axis}", 1.0) for axis in "xyz"])
-    bias = np.array([values.get(f"accelerometer_bias_{axis}", 0.0) for axis in "xyz"])
-    mounting = Rotation.from_euler("y", -values.get("mounting_pitch", 0.0)).as_matrix()
-    f_b = (f_b / (values.get("accelerometer_scale", 1.0) * scale) - bias) @ mounting.T
-    w_b = w_b @ mounting.T
+    mounting = Rotation.from_euler("ZY", [values.get("mounting_yaw", 0.0), -values.get("mounting_pitch", 0.0)])
+    f_b, w_b = (readings @ mounting.as_matrix().T for readings in (f_b, w_b))
     edges = STEP * np.arange(int(t[-1] / STEP) + 1)
     # the usual number of samples in half a second
     window = max(round(_VIBRATION_WINDOW / float(np.median(np.diff(t)))), 2)
@@ -70,7 +72,8 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
         round(_STILL_WINDOW / STEP) + 1, center=True, min_periods=round(1 / STEP)
     )
     deviation = rolling.std().fillna(np.inf).to_numpy()
-    t_aid, aid = _aid(recording)
+    t_aid, aid = aid_of(recording)
+    delay = "gnss_delay" if recording.wheel is None else "wheel_delay"
     gnss = recording.gnss
     return SpeedDrive(
         t=t,
@@ -82,10 +85,20 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
         vibration=vibration[:, 0],
         spread=np.stack([deviation[:, :3].max(1), deviation[:, 3:].max(1)], -1),
         stamp_aid=t_aid - start,
-        t_aid=t_aid - start - values.get("gnss_delay" if recording.wheel is None else "wheel_delay", 0.0),
+        t_aid=t_aid - start - values.get(delay, 0.0),
         aid=aid * (values.get("wheel_scale", 1.0) if recording.wheel is not None else 1.0),
         gravity=gravity_at(replace(recording, gnss=None if gnss is None else gnss[: start + until])),
+        states_std=_states_std(calibration, delay),
     )
+
+
+def _states_std(calibration: Calibration | None, delay: str) -> np.ndarray:
+    """Standard deviations of the filter's states before the first sample: of what was calibrated, its own."""
+    known = {} if calibration is None else {str(name): float(std) for name, std in calibration.std.items()}
+    named = {_MEANS.get(name, name): std for name, std in known.items()}
+    if delay in known:
+        named["imu_delay"] = known[delay]
+    return np.array([named.get(name, std) for name, std in STATES.items()])
 
 
 def _constants(calibration: Calibration | None) -> dict[str, float]:
@@ -105,7 +118,7 @@ def _means(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
     return np.diff(at_edges, axis=0) / np.diff(edges)[:, None]
 
 
-def _aid(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+def aid_of(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     if recording.wheel is not None:
         speed = recording.wheel["speed"].dropna()
         return speed.index.to_numpy(float), speed.to_numpy(float)
@@ -161,4 +174,5 @@ def steps_until(drive: SpeedDrive, until: float) -> dict[str, np.ndarray]:
         "aid_acceleration": acceleration,
         "aid_lead": np.where(aided, mean_time - drive.ends, 0.0),
         "aided": aided,
+        "states_std": drive.states_std,
     }

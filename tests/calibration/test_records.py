@@ -1,47 +1,76 @@
-"""What a calibration is to the next estimate: its values, their errors, and what they absorbed."""
+"""A calibration as a table, as text, and as a file that gives it back to the last digit."""
+
+import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from altijax.calibration.records import Calibration, prior_constants
-from altijax.drives import Drive, drive_arrays
-from altijax.elevation_estimate.model import UNCERTAINTY
-from tests.exact import EXACT
+from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table, worse_where_held_out
 
-ABSORBED = pd.DataFrame({"mounting_pitch": [9.8]}, index=["accelerometer_bias_x"])
-ONE = pd.DataFrame([[1.0]], ["accelerometer_bias_x"], ["accelerometer_bias_x"])
-BIAS = Calibration(
+NAMES = ["accelerometer_bias_x", "mounting_pitch"]
+ROW = held_out_row('a "drive" \\ é', "elevation", "m", (0.0, 30.0, 90.0), (2.0, 0.1), (5.0, 1 / 3))
+FOUND = Calibration(
     method="slope",
-    values=pd.Series({"accelerometer_bias_x": 0.2}),
-    std=pd.Series({"accelerometer_bias_x": 0.01}),
-    correlation=ONE,
-    absorbed=ABSORBED,
-    held_out=pd.DataFrame(),
+    table=constants_table(
+        pd.DataFrame(
+            {"value": [0.1, 1 / 3], "std": [1e-17, np.pi], "unit": ["m/s^2", "rad"], "prior": 0.0, "prior_std": 0.3},
+            index=NAMES,
+        )
+    ),
+    correlation=pd.DataFrame([[1.0, -0.7], [-0.7, 1.0]], NAMES, NAMES),
+    absorbed=pd.DataFrame({"wheel_scale": [1e300, -np.inf]}, NAMES),
+    undetermined=('a "sentence"\nof two lines',),
+    held_out=held_out_table([ROW]),
 )
 
 
-@pytest.fixture(scope="module")
-def drive() -> Drive:
-    return drive_arrays(EXACT, turns=True)[0]
+def same(a: Calibration, b: Calibration) -> bool:
+    for field in ("table", "correlation", "absorbed", "held_out"):
+        # An index of no columns has no type to speak of.
+        of_columns = "equiv" if len(getattr(a, field).columns) else False
+        pd.testing.assert_frame_equal(
+            getattr(a, field), getattr(b, field), check_exact=True, check_column_type=of_columns
+        )
+    return (a.method, a.undetermined) == (b.method, b.undetermined)
 
 
-def test_a_calibrated_constant_is_off_by_itself_and_by_what_it_absorbed(drive: Drive) -> None:
-    prior = prior_constants(drive, "slope", BIAS)
-    bias, pitch = (prior.names.index(name) for name in ("accelerometer_bias_x", "mounting_pitch"))
-    assert prior.mean[bias] == 0.2
-    absorbed = 9.8 * UNCERTAINTY["mounting_pitch"]
-    assert prior.covariance[bias, bias] == pytest.approx(0.01**2 + absorbed**2)
-    assert prior.covariance[bias, pitch] == pytest.approx(absorbed * UNCERTAINTY["mounting_pitch"])
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {},
+        {"absorbed": pd.DataFrame(index=NAMES), "held_out": pd.DataFrame(), "undetermined": ()},
+        {"held_out": FOUND.held_out.assign(held_out=np.nan, worse=True)},
+    ],
+)
+def test_a_file_gives_it_back(tmp_path: Path, changes: dict[str, object]) -> None:
+    calibration = dataclasses.replace(FOUND, **changes)
+    calibration.save(tmp_path / "car.toml")
+    assert same(Calibration.load(tmp_path / "car.toml"), calibration)
 
 
-def test_another_method_takes_value_and_error_alone(drive: Drive) -> None:
-    prior = prior_constants(drive, "fused", BIAS)
-    assert prior.names[0] == "accelerometer_bias_x" and prior.mean[0] == 0.2
-    assert prior.covariance[0, 0] == pytest.approx(0.01**2)
+def test_what_is_no_calibration_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "recording.toml"
+    for text in ("name = 'a drive'", "not toml"):
+        path.write_text(text)
+        with pytest.raises(ValueError, match=r"recording.toml is not a calibration"):
+            Calibration.load(path)
 
 
-def test_what_is_fixed_is_no_unknown(drive: Drive) -> None:
-    prior = prior_constants(drive, "shirai", BIAS, {"initial_vertical_speed": 0.5})
-    assert "initial_vertical_speed" not in prior.names
-    assert np.isfinite(prior.mean).all()
+def test_the_table_has_values_errors_and_shifts() -> None:
+    assert list(FOUND.table.columns) == ["value", "std", "unit", "prior", "prior_std", "shift"]
+    assert FOUND.values["mounting_pitch"] == 1 / 3 and FOUND.std["mounting_pitch"] == np.pi
+    np.testing.assert_allclose(FOUND.table["shift"], [1 / 3, 10 / 9])
+    assert FOUND.covariance.loc["accelerometer_bias_x", "mounting_pitch"] == pytest.approx(-0.7e-17 * np.pi)
+
+
+def test_it_reads_as_a_table_and_says_when_it_harms() -> None:
+    for text in (repr(FOUND), FOUND._repr_html_()):
+        for word in ("slope", "mounting_pitch", "m/s^2", "until", "sentence"):
+            assert word in text
+    assert worse_where_held_out(FOUND) == ""
+    row = held_out_row("drive", "speed", "m/s", (0.0, 30.0, 90.0), (2.0, 0.1), (0.5, 0.7))
+    harmful = dataclasses.replace(FOUND, held_out=held_out_table([row]))
+    said = "worse where they were not fitted: speed of 'drive' (0.5 to 0.7 m/s)"
+    assert said in worse_where_held_out(harmful) and said in repr(harmful)

@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from altijax.calibration.records import prior_constants
 from altijax.drives import Drive, drive_arrays, reference_heights
 from altijax.elevation_estimate import model as model
 from altijax.elevation_estimate.posterior import Posterior, elevation_posterior
+from altijax.elevation_estimate.priors import prior_constants
 from benchmarks.elevation import errors_and_bars
 from tests.exact import EXACT
 

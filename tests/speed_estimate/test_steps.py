@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from altijax.calibration.records import Calibration
+from altijax.calibration.records import Calibration, constants_table
 from altijax.recordings import Recording
 from altijax.speed_estimate.steps import STEP, drive_in_steps, initial_state, steps_until
 from tests.made_drives import curvy_recording
@@ -18,9 +18,16 @@ def drive() -> Recording:
 
 
 def calibration(**values: float) -> Calibration:
-    named = pd.Series(values)
+    columns = {"value": pd.Series(values), "std": 0.0, "unit": "1", "prior": 0.0, "prior_std": 1.0}
     empty = pd.DataFrame()
-    return Calibration(method="slope", values=named, std=0 * named, correlation=empty, absorbed=empty, held_out=empty)
+    return Calibration(
+        method="slope",
+        table=constants_table(pd.DataFrame(columns)),
+        correlation=empty,
+        absorbed=empty,
+        undetermined=(),
+        held_out=empty,
+    )
 
 
 def test_steps_are_means_of_the_readings(drive: Recording) -> None:

@@ -1,0 +1,200 @@
+"""Constants fitted to a reference: the most probable ones under normal priors and noise that the misfit itself shows.
+
+Least squares by `levenberg_marquardt` in units of the priors' standard deviations. How far to trust the reference
+against the priors nobody knows beforehand: the noise of each kind of residual is taken from its own size, neighbours
+counted as one as far as they are correlated, and the fit repeated until both agree.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax.calibration.identifiability import describe_undetermined, identify_information
+from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.records import Calibration, constants_table
+from altijax.calibration.serial_correlation import statistical_inefficiency
+from altijax.least_squares import levenberg_marquardt
+
+# Rounds of fit and noise. The first one trusts the data ten times more than they deserve at the prior.
+_ROUNDS, _FIRST = 4, 0.1
+# No reference and no model is better than this share of what the constants may change.
+_LEAST = 1e-5
+
+Residuals = Callable[[jax.Array], tuple[jax.Array, ...]]
+Found = tuple[jax.Array, jax.Array, tuple[jax.Array, ...]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReferenceFit:
+    """Unknowns in units of their prior standard deviations, counted from the prior means.
+
+    Attributes
+    ----------
+    x : ndarray
+        (unknowns,) Most probable values.
+    covariance : ndarray
+        (unknowns, unknowns) From data and prior.
+    residuals : tuple of ndarray
+        What is left, group by group.
+    noise : ndarray
+        (groups,) Standard deviation that each sample of a group counts with.
+    """
+
+    x: np.ndarray
+    covariance: np.ndarray
+    residuals: tuple[np.ndarray, ...]
+    noise: np.ndarray
+
+
+def weighted_fit(residuals: Residuals, x0: jax.Array, noise: jax.Array) -> Found:
+    """Most probable unknowns for given noise, to be jitted; and the residuals there.
+
+    Parameters
+    ----------
+    residuals : callable
+        Groups of residuals (series, time), zero where there is none, of the unknowns as `ReferenceFit` has them.
+    x0 : (unknowns,)
+        Where to begin.
+    noise : (groups,)
+        Standard deviation of each group.
+
+    Returns
+    -------
+    x : (unknowns,)
+        Most probable values.
+    covariance : (unknowns, unknowns)
+        From data and prior.
+    residuals : tuple of arrays
+        At the minimum.
+    """
+
+    def all_of(x: jax.Array) -> jax.Array:
+        groups = residuals(x)
+        return jnp.concatenate([*((r / noise[k]).reshape(-1) for k, r in enumerate(groups)), x])
+
+    fit = levenberg_marquardt(all_of, x0)
+    return fit.x, fit.covariance, residuals(fit.x)
+
+
+def fit_to_reference(
+    solve: Callable[[jax.Array, jax.Array], Found], unknowns: int, first: Sequence[jax.Array]
+) -> ReferenceFit:
+    """Fit and noise in turns.
+
+    Parameters
+    ----------
+    solve : callable
+        What `weighted_fit` gives for a problem, by x0 and noise.
+    unknowns : int
+        How many.
+    first : sequence of arrays
+        Residuals at the prior means.
+
+    Returns
+    -------
+    fit : ReferenceFit
+        The last round's.
+    """
+    sizes = np.array([_size(np.asarray(r)) for r in first])
+    least = np.maximum(_LEAST * sizes, np.finfo(float).tiny)
+    x, noise = jnp.zeros(unknowns), np.maximum(_FIRST * sizes, least)
+    for _ in range(_ROUNDS):
+        x, covariance, residuals = solve(x, jnp.asarray(noise))
+        used = noise
+        noise = np.maximum([_noise(np.asarray(r)) for r in residuals], least)
+    return ReferenceFit(
+        x=np.asarray(x),
+        covariance=np.asarray(covariance),
+        residuals=tuple(np.asarray(r) for r in residuals),
+        noise=used,
+    )
+
+
+def calibration_from(
+    method: str,
+    names: Sequence[str],
+    deviation: np.ndarray,
+    covariance: np.ndarray,
+    held_out: pd.DataFrame,
+    *,
+    prior: pd.DataFrame = PARAMETERS,
+    absorbed: pd.DataFrame | None = None,
+) -> Calibration:
+    """The record of a fit.
+
+    Parameters
+    ----------
+    method : str
+        Method fitted.
+    names : sequence of str
+        Names of the constants.
+    deviation : ndarray
+        (names,) From the prior means, in prior standard deviations.
+    covariance : ndarray
+        (names, names) In the same units.
+    held_out : DataFrame
+        As in `Calibration`.
+    prior : DataFrame, optional
+        Columns nominal, uncertainty and unit by name.
+    absorbed : DataFrame, optional
+        As in `Calibration`.
+
+    Returns
+    -------
+    calibration : Calibration
+        With what the data do not determine in words.
+
+    Raises
+    ------
+    ValueError
+        If a constant changes nothing.
+    """
+    names = list(names)
+    idle = [name for name, variance in zip(names, np.diag(covariance), strict=True) if 1 - variance < 1e-9]
+    if idle:
+        raise ValueError(f"{', '.join(idle)}: changes nothing in method {method!r} on these recordings; leave it out")
+    known = prior.loc[names]
+    units = known["uncertainty"].to_numpy(float)
+    information = np.linalg.inv(covariance) - np.eye(len(names))
+    found = identify_information(
+        jnp.asarray(information / np.outer(units, units)), jnp.asarray(units), names=tuple(names)
+    )
+    std = np.sqrt(np.diag(covariance))
+    table = pd.DataFrame(
+        {
+            "value": known["nominal"] + units * deviation,
+            "std": units * std,
+            "unit": known["unit"],
+            "prior": known["nominal"],
+            "prior_std": units,
+        }
+    )
+    return Calibration(
+        method=method,
+        table=constants_table(table),
+        correlation=pd.DataFrame(covariance / np.outer(std, std), names, names),
+        absorbed=pd.DataFrame(index=names) if absorbed is None else absorbed,
+        undetermined=tuple(describe_undetermined(found)),
+        held_out=held_out,
+    )
+
+
+def _size(r: np.ndarray) -> float:
+    there = r != 0
+    return float(np.sqrt(np.mean(r[there] ** 2))) if there.any() else 1.0
+
+
+def _noise(r: np.ndarray) -> float:
+    """Root mean square times the root of the number of neighbours that count as one; a lasting mean is one error."""
+    there = r != 0
+    if not there.any():
+        return 1.0
+    means = np.sum(r, 1) / np.maximum(np.sum(there, 1), 1)
+    rest = np.where(there, r - means[:, None], 0)
+    together = np.asarray(statistical_inefficiency(rest))
+    squares, counts = np.sum(rest**2, 1), np.sum(there, 1)
+    return float(np.sqrt(np.sum(np.maximum(squares * together, (counts * means) ** 2)) / np.sum(counts)))

@@ -1,0 +1,369 @@
+"""Constants of the speed methods, fitted to a reference speed.
+
+The methods without a filter run from stretch to stretch of 20 s; the speed and the pitch that each stretch begins with
+are its own and marginalised (`fit_shared`), and inside the roll of "aided" stands the reference speed. "filter" finds
+its constants by itself from any aid: here the reference is the aid. What belongs to the aid of the verb, the wheels'
+scale and the delays, is found from the aid against the reference, the same for all methods.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pandas as pd
+
+from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.records import Calibration, held_out_row, held_out_table
+from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
+from altijax.calibration.shared_parameters import fit_shared
+from altijax.drives import gravity_at, imu_of, start_of
+from altijax.recordings import Recording
+from altijax.rotations import euler_to_matrix
+from altijax.sensors import Accelerometer, Gyro, correct_accelerometer, correct_gyro
+from altijax.signals import interval_means
+from altijax.speed import speed_with_aided_roll, speed_with_roll, speed_without_roll
+from altijax.speed_estimate.estimates import (
+    AUTO_SENSORS,
+    NOMINAL_NOISE,
+    dead_reckon,
+    fit_noise,
+    on_imu,
+    run_filter,
+)
+from altijax.speed_estimate.model import STATES, state_names
+from altijax.speed_estimate.steps import aid_of, drive_in_steps, initial_state, speed_of
+
+STRETCH = 20.0
+"""Length of a stretch, s: long enough for a gyro's bias, short against the growth of errors in turns."""
+
+OUTAGE = 10.0
+"""Length of the outages in which a calibration is judged, s."""
+
+_OF_THE_AID = ("wheel_scale", "wheel_delay", "gnss_delay")
+_STEP, _EVERY = 0.05, 10
+# A reference that far away says nothing of the speed, s.
+_NEAR = 1.0
+# What a stretch begins with: standard deviations of speed (m/s) and pitch (rad) about the first guess.
+_OWN_STD = (1.0, 0.1)
+# The filter's names of constants that it sees from the other side.
+_MIRRORED = {"mounting_yaw": "travel_yaw"}
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class _Stretches:
+    f: jax.Array
+    w: jax.Array
+    gravity: jax.Array
+    inside: jax.Array  # reference speed at every node, for the roll of "aided"
+    speed: jax.Array  # the same at every tenth
+    weight: jax.Array  # 1 or 0 over the standard deviation
+
+
+def calibrate_speed(
+    recordings: Sequence[Recording], names: Sequence[str], *, method: str, until: float | None = None
+) -> Calibration:
+    """Constants that bring a method's speed closest to a reference speed.
+
+    Parameters
+    ----------
+    recordings : sequence of Recording
+        With ``v_e`` and ``v_n`` (and ``v_u``) in their reference; the constants are common to them.
+    names : sequence of str
+        Constants to find; the others keep their nominal values, but that "filter" always finds its own.
+    method : {"conventional", "roll", "aided", "filter"}
+        Method of `estimate_speed`.
+    until : float, optional
+        Last time whose reference may be used.
+
+    Returns
+    -------
+    calibration : Calibration
+        ``held_out`` has the errors of `estimate_speed` in outages of 10 s with the aid's speeds up to their start, and
+        those of the aid where one of its constants was asked for.
+
+    Raises
+    ------
+    ValueError
+        If a constant changes nothing, or the reference is missing or too short.
+    """
+    of_aid = [name for name in names if name in _OF_THE_AID]
+    of_imu = [name for name in names if name not in _OF_THE_AID]
+    with jax.enable_x64(True):
+        references = [_reference(recording) for recording in recordings]
+        ends = [np.inf if until is None else until - start_of(recording) for recording in recordings]
+        parts, rows = [], []
+        if of_imu:
+            fit = _from_filter if method == "filter" else _from_stretches
+            parts.append(fit(recordings, references, ends, of_imu, method))
+        if of_aid:
+            found, judged = _from_aid(recordings, references, ends, of_aid, method)
+            parts.append(found)
+            rows += judged
+        calibration = _joined(parts, list(names))
+        for recording, reference, end in zip(recordings, references, ends, strict=True):
+            rows += _outages(recording, reference, end, method, calibration)
+    return replace(calibration, held_out=held_out_table(rows))
+
+
+def _reference(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
+    """Times from the first IMU sample, and speeds, of the reference within the IMU's span."""
+    reference = recording.reference
+    if reference is None or not {"v_e", "v_n"} <= set(reference) or not reference["v_e"].notna().any():
+        raise ValueError(
+            f"recording {recording.name!r} has no reference speeds: a reference.csv with columns v_e, v_n, v_u"
+        )
+    t, speed = speed_of(reference)
+    t = t - start_of(recording)
+    inside = (t >= 0) & (t <= imu_of(recording).index[-1] - start_of(recording))
+    return t[inside], speed[inside]
+
+
+def _at(reference: tuple[np.ndarray, np.ndarray], times: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Reference speed at times, and whether one is near on both sides."""
+    t, speed = reference
+    k = np.clip(np.searchsorted(t, times), 1, t.size - 1)
+    near = (times >= t[0]) & (times <= t[-1]) & (t[k] - t[k - 1] <= _NEAR)
+    return np.interp(times, t, speed), near
+
+
+def _from_stretches(
+    recordings: Sequence[Recording],
+    references: Sequence[tuple[np.ndarray, np.ndarray]],
+    ends: Sequence[float],
+    names: list[str],
+    method: str,
+) -> Calibration:
+    pieces = [
+        piece
+        for recording, reference, end in zip(recordings, references, ends, strict=True)
+        for piece in _stretches(recording, reference, end)
+    ]
+    if not pieces:
+        raise ValueError(f"method {method!r} needs a reference speed for {STRETCH:g} s before the end of the fit")
+    stretches = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(data for data, _ in pieces))
+    own0 = jnp.asarray(np.stack([guess for _, guess in pieces]))
+    known = PARAMETERS.loc[names]
+    mean, unit = (jnp.asarray(known[column].to_numpy(float)) for column in ("nominal", "uncertainty"))
+    static = {"names": tuple(names), "method": method}
+    first = _solve(jnp.zeros(len(names)), jnp.ones(1), stretches, own0, mean, 0 * unit, **static)[2]
+    fit = fit_to_reference(lambda x, noise: _solve(x, noise, stretches, own0, mean, unit, **static), len(names), first)
+    return calibration_from(method, names, fit.x, fit.covariance, pd.DataFrame())
+
+
+def _stretches(
+    recording: Recording, reference: tuple[np.ndarray, np.ndarray], end: float
+) -> list[tuple[_Stretches, np.ndarray]]:
+    """Stretches end to end up to the end of the fit, and a first guess of the speed and pitch each begins with."""
+    imu = imu_of(recording)
+    t = imu.index.to_numpy(float) - start_of(recording)
+    if not {"gx", "gy", "gz"} <= set(imu):
+        raise ValueError(f"recording {recording.name!r} has no gyro (gx, gy, gz in the IMU), which a speed needs")
+    nodes = _STEP * np.arange(round(STRETCH / _STEP) + 1)
+    gravity = gravity_at(recording)
+    found = []
+    for start in np.arange(t[0], min(end, t[-1], reference[0][-1]) - STRETCH + 1e-9, STRETCH):
+        inside = t[(t >= start) & (t <= start + STRETCH)]
+        speed, near = _at(reference, start + nodes[::_EVERY])
+        if np.max(np.diff(inside), initial=0.0) > 5 * _STEP or near.mean() < 0.5:
+            continue
+        edges = start + np.append(nodes - _STEP / 2, nodes[-1] + _STEP / 2)
+        readings = (interval_means(t, imu[["ax", "ay", "az", "gx", "gy", "gz"]].to_numpy(float).T, edges)).T
+        gained = (speed[4] - speed[0]) / (4 * _EVERY * _STEP)
+        force = readings[: 4 * _EVERY, 0].mean() - gained
+        data = _Stretches(
+            f=readings[:, :3],
+            w=readings[:, 3:],
+            gravity=jnp.asarray(gravity),
+            inside=jnp.asarray(np.interp(start + nodes, *reference)),
+            speed=jnp.asarray(np.where(near, speed, 0.0)),
+            weight=jnp.asarray(near.astype(float)),
+        )
+        found.append((data, np.array([speed[0], np.arcsin(np.clip(force / gravity, -0.5, 0.5))])))
+    return found
+
+
+@partial(jax.jit, static_argnames=("names", "method"))
+def _solve(
+    x0: jax.Array,
+    noise: jax.Array,
+    stretches: _Stretches,
+    own0: jax.Array,
+    mean: jax.Array,
+    unit: jax.Array,
+    names: tuple[str, ...],
+    method: str,
+) -> Found:
+    """The constants in units of their priors, each stretch's own speed and pitch averaged over."""
+    weighted = replace(stretches, weight=stretches.weight / noise[0])
+
+    def residual(x: jax.Array, own: jax.Array, stretch: _Stretches) -> jax.Array:
+        values = dict(zip(names, mean + unit * x, strict=True))
+        return stretch.weight * (_dead_reckoned(values, own, stretch, method) - stretch.speed)
+
+    ones = jnp.ones(len(names))
+    fit = fit_shared(residual, weighted, 0 * ones, ones, own0, jnp.asarray(_OWN_STD), start=(x0, own0))
+    return fit.shared, fit.covariance, (fit.residuals * noise[0],)
+
+
+def _dead_reckoned(values: dict[str, jax.Array], own: jax.Array, stretch: _Stretches, method: str) -> jax.Array:
+    def triad(kind: str, nominal: float) -> jax.Array:
+        return jnp.stack([jnp.asarray(values.get(f"{kind}_{axis}", nominal)) for axis in "xyz"])
+
+    scale = values.get("accelerometer_scale", 1.0) * triad("accelerometer_scale", 1.0)
+    f = correct_accelerometer(Accelerometer(bias=triad("accelerometer_bias", 0.0), scale=scale), stretch.f)
+    w = correct_gyro(Gyro(bias=triad("gyro_bias", 0.0), scale=triad("gyro_scale", 1.0)), stretch.w, f)
+    angles = [jnp.asarray(values.get(name, 0.0)) for name in ("mounting_pitch", "mounting_yaw")]
+    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), *angles]))
+    (f_x, f_y, _), (_, w_y, w_z) = (f @ mounting.T).T, (w @ mounting.T).T
+    start = own[0], own[1], stretch.gravity, _STEP
+    if method == "conventional":
+        speed = speed_without_roll(f_x, w_y, *start)[0]
+    elif method == "roll":
+        speed = speed_with_roll(f_x, f_y, w_y, w_z, *start)[0]
+    else:
+        speed = speed_with_aided_roll(f_x, f_y, w_y, w_z, stretch.inside, jnp.ones_like(f_x), *start)[0]
+    return speed[::_EVERY]
+
+
+def _from_filter(
+    recordings: Sequence[Recording],
+    references: Sequence[tuple[np.ndarray, np.ndarray]],
+    ends: Sequence[float],
+    names: list[str],
+    method: str,
+) -> Calibration:
+    """One drive after the other, each beginning with what the ones before have left; the reference as the aid."""
+    states = [_MIRRORED.get(name, name) for name in names]
+    signs = np.array([-1.0 if name in _MIRRORED else 1.0 for name in names])
+    rows = [state_names(AUTO_SENSORS).index(state) for state in states]
+    prior = PARAMETERS.copy()
+    prior.loc[names, "uncertainty"] = [STATES[state] for state in states]
+    unit = prior.loc[names, "uncertainty"].to_numpy(float)
+    calibration, value = None, np.zeros(len(names))
+    for recording, (t, speed), end in zip(recordings, references, ends, strict=True):
+        used = t <= end
+        if used.sum() < 3 or t[used][-1] - t[used][0] < STRETCH:
+            raise ValueError(f"method 'filter' needs a reference speed for {STRETCH:g} s before the end of the fit")
+        start, last = start_of(recording), float(t[used][-1])
+        aid = pd.DataFrame({"v_e": speed[used], "v_n": 0.0}, index=t[used] + start)
+        place = gravity_at(recording)
+        drive = drive_in_steps(
+            replace(recording, imu=imu_of(recording).loc[: start + last], wheel=None, gnss=aid), calibration, last
+        )
+        drive = replace(drive, gravity=place)
+        initial = initial_state(drive, last, None, None)
+        track = run_filter(
+            drive, last, AUTO_SENSORS, initial, fit_noise(drive, last, AUTO_SENSORS, initial, NOMINAL_NOISE)
+        )
+        value = value + signs * np.asarray(track.states)[-1, rows]
+        covariance = np.asarray(track.last_covariance)[np.ix_(rows, rows)] * np.outer(signs, signs)
+        calibration = calibration_from(
+            method, names, value / unit, covariance / np.outer(unit, unit), pd.DataFrame(), prior=prior
+        )
+    assert calibration is not None  # there is at least one drive
+    return calibration
+
+
+def _from_aid(
+    recordings: Sequence[Recording],
+    references: Sequence[tuple[np.ndarray, np.ndarray]],
+    ends: Sequence[float],
+    names: list[str],
+    method: str,
+) -> tuple[Calibration, list[dict[str, str | float | bool]]]:
+    """The wheels' or the receiver's speed, corrected, against the reference."""
+    delays = ["gnss_delay" if recording.wheel is None else "wheel_delay" for recording in recordings]
+    data = []
+    for recording, (t, speed), delay in zip(recordings, references, delays, strict=True):
+        t_aid, aid = aid_of(recording)
+        t_aid = t_aid - start_of(recording)
+        known = (t > t_aid[0] + _NEAR) & (t < t_aid[-1] - _NEAR)
+        gap = np.diff(t_aid)[np.clip(np.searchsorted(t_aid, t) - 1, 0, t_aid.size - 2)]
+        known &= gap <= _NEAR
+        data.append({"t": t[known], "speed": speed[known], "t_aid": t_aid, "aid": aid, "delay": delay})
+    fitted = [int(np.sum(part["t"] <= end)) for part, end in zip(data, ends, strict=True)]
+    if min(fitted) < 3:
+        raise ValueError(
+            f"{', '.join(names)}: fewer than 3 speeds of aid and reference together before the end of the fit"
+        )
+    known = PARAMETERS.loc[names]
+    mean, unit = (jnp.asarray(known[column].to_numpy(float)) for column in ("nominal", "uncertainty"))
+
+    def errors(values: dict, counts: Sequence[int]) -> tuple[jax.Array, ...]:
+        found = []
+        for part, n in zip(data, counts, strict=True):
+            scale = values.get("wheel_scale", 1.0) if part["delay"] == "wheel_delay" else 1.0
+            at = jnp.asarray(part["t"][:n]) + values.get(part["delay"], 0.0)
+            speed = scale * jnp.interp(at, jnp.asarray(part["t_aid"]), jnp.asarray(part["aid"]))
+            found.append((speed - part["speed"][:n])[None])
+        return tuple(found)
+
+    def residuals(x: jax.Array) -> tuple[jax.Array, ...]:
+        return errors(dict(zip(names, mean + unit * x, strict=True)), fitted)
+
+    fit = fit_to_reference(
+        jax.jit(lambda x, noise: weighted_fit(residuals, x, noise)), len(names), residuals(jnp.zeros(len(names)))
+    )
+    calibration = calibration_from(method, names, fit.x, fit.covariance, pd.DataFrame())
+    whole = [part["t"].size for part in data]
+    rows = []
+    for recording, part, n, *pair in zip(
+        recordings, data, fitted, errors({}, whole), errors(dict(calibration.values), whole), strict=True
+    ):
+        nominal, best = (np.asarray(error)[0] for error in pair)
+        interval = np.array([part["t"][0], part["t"][n - 1], part["t"][-1]]) + start_of(recording)
+        halves = [[_rms(error[cut]) for error in (nominal, best)] for cut in (slice(0, n), slice(n, None))]
+        rows.append(held_out_row(recording.name, "speed of the aid", "m/s", interval.tolist(), *halves))
+    return calibration, rows
+
+
+def _outages(
+    recording: Recording, reference: tuple[np.ndarray, np.ndarray], end: float, method: str, calibration: Calibration
+) -> list[dict[str, str | float | bool]]:
+    """Errors of the verb in outages end to end, those that lie before the end of the fit and those after it."""
+    errors = {}
+    last = min(imu_of(recording).index[-1] - start_of(recording), reference[0][-1]) - OUTAGE
+    first = OUTAGE + (end % OUTAGE if np.isfinite(end) else 0.0)
+    starts = np.arange(first, last + 1e-9, OUTAGE)
+    for kind, known in (("nominal", None), ("fitted", calibration)):
+        drive = drive_in_steps(recording, known, np.inf)
+        if not starts.size or not np.any(drive.t_aid <= 1.0):
+            return []  # without an aid at the start the verb wants an initial speed
+        for start in starts:
+            initial = initial_state(drive, start, None, None)
+            track = run_filter(drive, start, AUTO_SENSORS, initial, NOMINAL_NOISE)
+            estimate = on_imu(drive, track, AUTO_SENSORS)
+            if method != "filter":
+                dead_reckon(estimate, drive, track, start, AUTO_SENSORS, method, NOMINAL_NOISE)
+            times = start + np.arange(0.5, OUTAGE + 0.1, 0.5)
+            truth, near = _at(reference, times)
+            errors[kind, start] = (np.interp(times, drive.t, estimate["speed"]) - truth)[near]
+    halves = [
+        [_rms(np.concatenate([errors[kind, start] for start in chosen] or [[]])) for kind in ("nominal", "fitted")]
+        for chosen in (starts[starts + OUTAGE <= end], starts[starts >= end])
+    ]
+    interval = np.array([0.0, min(end, starts[-1] + OUTAGE), starts[-1] + OUTAGE]) + start_of(recording)
+    return [held_out_row(recording.name, f"speed in outages of {OUTAGE:g} s", "m/s", interval.tolist(), *halves)]
+
+
+def _rms(error: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(np.square(error)))) if np.size(error) else np.nan
+
+
+def _joined(parts: list[Calibration], names: list[str]) -> Calibration:
+    """Two calibrations of different constants, independent of each other, as one."""
+    if len(parts) == 1:
+        return parts[0]
+    first, second = parts
+    correlation = pd.concat([first.correlation, second.correlation]).fillna(0.0)
+    return replace(
+        first,
+        table=pd.concat([first.table, second.table]).loc[names],
+        correlation=correlation.loc[names, names],
+        absorbed=pd.concat([first.absorbed, second.absorbed]).loc[names],
+        undetermined=first.undetermined + second.undetermined,
+    )
