@@ -74,6 +74,11 @@ from altijax.calibration.allan import (
     averaging_factors,
     fit_allan,
 )
+from altijax.calibration.experiment_design import (
+    drive_information,
+    driving_protocol,
+    manoeuvre_gains,
+)
 from altijax.calibration.identifiability import (
     Identification,
     describe_undetermined,
@@ -83,6 +88,11 @@ from altijax.calibration.identifiability import (
 from altijax.calibration.serial_correlation import (
     mean_with_std,
     statistical_inefficiency,
+)
+from altijax.calibration.simulated_drives import (
+    Manoeuvres,
+    recorded_drive,
+    town_drive,
 )
 from altijax.calibration.standstill import (
     means_at_rest,
@@ -233,6 +243,10 @@ from altijax.wheels import (
 )
 
 if TYPE_CHECKING:
+    from altijax.calibration.drives import (
+        DriveCalibration,
+        calibrate_drive,
+    )
     from altijax.calibration.records import (
         Calibration,
     )
@@ -257,6 +271,8 @@ if TYPE_CHECKING:
         withheld_gnss_errors,
     )
     from altijax.plots import (
+        plot_calibration_correlation,
+        plot_calibration_errors,
         plot_elevation,
         plot_elevation_error,
         plot_streams,
@@ -281,6 +297,8 @@ _LAZY = {
     "list_datasets": "datasets",
     "load_dataset": "datasets",
     "gravity_at": "drives",
+    "DriveCalibration": "calibration.drives",
+    "calibrate_drive": "calibration.drives",
     "Calibration": "calibration.records",
     "calibrate": "estimates",
     "estimate_elevation": "estimates",
@@ -291,6 +309,8 @@ _LAZY = {
     "estimate_motion": "estimates",
     "score_motion": "estimates",
     "withheld_gnss_errors": "estimates",
+    "plot_calibration_correlation": "plots",
+    "plot_calibration_errors": "plots",
     "plot_elevation": "plots",
     "plot_elevation_error": "plots",
     "plot_streams": "plots",
@@ -311,9 +331,11 @@ __all__ = [
     "DatasetNotFoundError",
     "Delay",
     "DopplerReceiver",
+    "DriveCalibration",
     "Fit",
     "Gyro",
     "Identification",
+    "Manoeuvres",
     "Readings",
     "Recording",
     "RecordingError",
@@ -332,6 +354,7 @@ __all__ = [
     "allan_deviation",
     "averaging_factors",
     "calibrate",
+    "calibrate_drive",
     "circular_road",
     "correct_accelerometer",
     "correct_gyro",
@@ -345,6 +368,8 @@ __all__ = [
     "describe",
     "describe_undetermined",
     "doppler_velocity",
+    "drive_information",
+    "driving_protocol",
     "ecef_to_geodetic",
     "elevation_by_norm",
     "elevation_by_slope",
@@ -389,6 +414,7 @@ __all__ = [
     "list_datasets",
     "load_dataset",
     "low_pass",
+    "manoeuvre_gains",
     "match_endpoints",
     "matrix_to_euler",
     "matrix_to_quaternion",
@@ -401,6 +427,8 @@ __all__ = [
     "outage_table",
     "periodic_extension",
     "pitch_rate",
+    "plot_calibration_correlation",
+    "plot_calibration_errors",
     "plot_elevation",
     "plot_elevation_error",
     "plot_streams",
@@ -409,6 +437,7 @@ __all__ = [
     "pure_acceleration",
     "quaternion_to_matrix",
     "read_recording",
+    "recorded_drive",
     "resample",
     "rest_to_rest",
     "rms",
@@ -434,6 +463,7 @@ __all__ = [
     "state_names",
     "statistical_inefficiency",
     "still_samples",
+    "town_drive",
     "vee",
     "velocity_to_course",
     "vertical_acceleration",

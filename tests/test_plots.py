@@ -10,11 +10,18 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from altijax.estimates import estimate_elevation
-from altijax.plots import plot_elevation, plot_elevation_error, plot_streams
+from altijax.estimates import calibrate, estimate_elevation
+from altijax.plots import (
+    plot_calibration_correlation,
+    plot_calibration_errors,
+    plot_elevation,
+    plot_elevation_error,
+    plot_streams,
+)
 from tests.exact import EXACT
 
 ESTIMATE = estimate_elevation(EXACT, method="slope")
+CALIBRATION = calibrate(EXACT, ["accelerometer_bias_x", "wheel_scale"], method="slope", until=30.0)
 
 
 @pytest.fixture(autouse=True)
@@ -60,3 +67,34 @@ def test_what_cannot_be_drawn_is_said() -> None:
         plot_elevation_error({"slope": ESTIMATE}, dataclasses.replace(EXACT, reference=None))
     with pytest.raises(ValueError, match="neither an IMU nor a speed"):
         plot_streams(dataclasses.replace(EXACT, imu=None, wheel=None, gnss=None))
+
+
+def test_correlations_have_names_and_numbers() -> None:
+    ax = plot_calibration_correlation(CALIBRATION)
+    names = list(CALIBRATION.table.index)
+    assert [label.get_text() for label in ax.get_xticklabels()] == names
+    assert [label.get_text() for label in ax.get_yticklabels()] == names
+    drawn = [text.get_text() for text in ax.texts]
+    assert drawn == [f"{value:.2f}" for value in CALIBRATION.correlation.to_numpy().ravel()]
+
+
+@pytest.mark.parametrize(
+    ("method", "labels"),
+    [(None, ["elevation (m)"]), ("roll", ["speed (m/s)"]), ("epoch", ["roll (deg)", "pitch (deg)", "heading (deg)"])],
+)
+def test_errors_before_and_after_a_calibration(method: str | None, labels: list[str]) -> None:
+    axes = plot_calibration_errors(CALIBRATION, EXACT, method=method)
+    assert [ax.get_ylabel() for ax in axes] == labels and axes[-1].get_xlabel() == "time (s)"
+    legend = [text.get_text() for text in axes[0].get_legend().get_texts()]
+    assert [text.split(":")[0] for text in legend] == ["nominal", "calibrated"]
+    assert all("where fitted" in text and "held out" in text for text in legend)
+    if method is None:
+        nominal, calibrated, _ = axes[0].get_lines()
+        assert np.abs(calibrated.get_ydata()).max() < np.abs(nominal.get_ydata()).max()
+
+
+def test_errors_need_a_method_of_an_estimate() -> None:
+    with pytest.raises(ValueError, match=r"method must be one of an estimate, shirai, .* got 'drive'"):
+        plot_calibration_errors(CALIBRATION, EXACT, method="drive")
+    with pytest.raises(ValueError, match="'exact' has no reference"):
+        plot_calibration_errors(CALIBRATION, dataclasses.replace(EXACT, reference=None), method="roll")
