@@ -26,6 +26,7 @@ from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, tow
 
 GRAVITY, DENSITY = 9.80665, {"gyro": float(aj.MEMS_GYRO.noise_density)}
 DENSITY["accelerometer"] = float(aj.MEMS_ACCELEROMETER.noise_density)
+DENSITY["receiver"] = 0.0
 NOMINAL = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
 PRIOR_STD = np.array([row[1] for row in DRIVE_PARAMETERS.values()])
 
@@ -49,7 +50,7 @@ def drives(count: int, rate: float) -> pd.DataFrame:
     rng = np.random.default_rng(0)
     rows = []
     for number in range(count):
-        truth = NOMINAL + PRIOR_STD * np.clip(rng.normal(size=12), -1.3, 1.3)
+        truth = NOMINAL + PRIOR_STD * np.clip(rng.normal(size=PRIOR_STD.size), -1.3, 1.3)
         recorded = {name: np.asarray(value) for name, value in record(truth, jax.random.key(number)).items()}
         start = time.perf_counter()
         calibration = calibrate_stretches(drive_stretches(recorded, GRAVITY, DENSITY))
@@ -61,7 +62,7 @@ def drives(count: int, rate: float) -> pd.DataFrame:
                     "error": table["value"] - truth,
                     "std": table["std"],
                     "seconds": seconds,
-                    "known": calibration.identification.rank == 12,
+                    "known": calibration.identification.rank == PRIOR_STD.size,
                 }
             )
         )

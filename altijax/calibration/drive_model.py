@@ -4,10 +4,17 @@ The IMU carries attitude and velocity from their values at the start of the stre
 receiver's, and, seen from the vehicle, with the wheels' and with standing still sideways and upwards. All stamps are
 corrected by their delays: the reading stamped t was that of ``t - delay`` on the IMU's clock. Vehicle axes come from
 those of the IMU by the mounting, ``v_vehicle = C(mounting) v_imu``: the IMU sits nose up by `mounting_pitch` and turned
-to the left by `mounting_yaw`. Its roll changes nothing here. Lever arms and side slip are left out.
+to the left by `mounting_yaw`. Its roll changes nothing here. What stands still sideways and upwards is the middle of
+the rear axle, `lever_arm` behind the IMU; the antenna is `antenna_lever_arm` ahead of it. An accelerating body pitches
+up by `weight_transfer` a / g, and driven tyres turn faster than they roll, by `wheel_slip` a. Side slip, the way that
+steered wheels go further in a bend, and lever arms across and up are left out.
 
-The noise of the IMU within a stretch is part of the model: at the start of each interval its attitude and
-velocity are kicked by as much as white noise makes in that time. So a stretch is as long as one likes.
+The noise of the IMU within a stretch is part of the model: in each interval its attitude and velocity drift evenly by
+as much as white noise makes in that time, the straight line through Brownian motion. What is left of that between the
+ends of an interval has a third of the variance that kicks at its ends would leave. So a stretch is as long as one
+likes. So is an error of the receiver's velocity that lasts a whole stretch, as satellites' paths through the air and
+reflections make it: no residual shows it, and without it a long drive would know the wheels better than the receiver
+knows the speed.
 """
 
 from dataclasses import dataclass
@@ -31,9 +38,14 @@ DRIVE_PARAMETERS = {
     "gyro_bias_z": (0.0, 0.02, "rad/s"),
     "mounting_pitch": (0.0, 0.1, "rad"),
     "mounting_yaw": (0.0, 0.1, "rad"),
+    "gyro_scale_z": (1.0, 0.01, "1"),
+    "weight_transfer": (0.0, 0.1, "1"),
+    "wheel_slip": (0.0, 0.003, "s^2/m"),
+    "lever_arm": (0.0, 1.5, "m"),
+    "antenna_lever_arm": (0.0, 1.0, "m"),
 }
 """Parameters by name, in the order of the fit: nominal value, prior standard deviation (a consumer's instrument fixed
-to a car by hand, assumed), unit."""
+to a car by hand, assumed; a tyre slips by some 1 % at a third of g), unit."""
 
 GROUPS = ("GNSS horizontal", "GNSS vertical", "wheel", "sideways", "upwards")
 """Kinds of residuals, in the order of the fields `gnss_std` and `wheel_std` of `Stretch`."""
@@ -42,7 +54,9 @@ STEP = 0.05
 """Length of a step, s: a car's turns are slow enough for it."""
 
 STEPS_OF_INTERVAL = 100
-"""Steps of an interval of the IMU's noise: within 5 s a consumer's gyro makes no more than 5 mm/s of velocity."""
+"""Steps of an interval of the IMU's noise, 5 s."""
+
+_LOOK = 3  # steps either way for the acceleration: wide against its noise, short against a driver's foot
 
 
 @jax.tree_util.register_dataclass
@@ -60,8 +74,8 @@ class Stretch:
         First guess of the attitude at the start.
     gravity : () m/s^2
         Magnitude of gravity.
-    noise : (2,) rad/sqrt(s), m/s/sqrt(s)
-        Random walk of attitude and of velocity that the IMU's noise makes.
+    noise : (3,) rad/sqrt(s), m/s/sqrt(s), m/s
+        Random walk of attitude and of velocity that the IMU's noise makes, and the size of the receiver's slow error.
     t_gnss : (epochs,) s
         Stamps of the receiver.
     v_gnss : (epochs, 3) m/s
@@ -100,9 +114,9 @@ def own_states(steps: int) -> int:
     Returns
     -------
     states : int
-        Attitude and velocity at the start, and six kicks at each later interval.
+        Attitude and velocity at the start, six drifts in each interval, and the receiver's slow error.
     """
-    return 6 * -(-steps // STEPS_OF_INTERVAL)
+    return 9 + 6 * -(-steps // STEPS_OF_INTERVAL)
 
 
 def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> jax.Array:
@@ -110,11 +124,12 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
 
     Parameters
     ----------
-    parameters : (12,)
+    parameters : (17,)
         Values in the order of `DRIVE_PARAMETERS`.
     own : (states,)
         Turn of the first guess of the attitude (rad) and velocity at the start (m/s), both in navigation axes; then,
-        interval after interval, kicks in units of their standard deviations, three for attitude and three for velocity.
+        interval after interval, drifts in units of their standard deviations, for attitude, then velocity;
+        last, in the same units, the error of the receiver.
     stretch : Stretch
         Its data.
 
@@ -124,44 +139,52 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
         East, North and up of all epochs, then wheel, sideways and upwards of all samples.
     """
     p = dict(zip(DRIVE_PARAMETERS, parameters, strict=True))
-    v_n, v_vehicle = _motion(p, own, stretch)
-    at_epochs = _at(stretch.t_gnss - p["gnss_delay"], v_n)
+    v_antenna, v_wheels = _motion(p, own, stretch)
+    at_epochs = _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:]
     gnss = (stretch.v_gnss - at_epochs) / stretch.gnss_std[:, jnp.asarray([0, 0, 1])]
-    at_samples = _at(stretch.t_wheel - p["wheel_delay"], v_vehicle)
+    at_samples = _at(stretch.t_wheel - p["wheel_delay"], v_wheels)
     shown = jnp.stack([p["wheel_scale"] * stretch.wheel, 0 * stretch.wheel, 0 * stretch.wheel], -1)
     wheel = (shown - at_samples) / stretch.wheel_std
     return jnp.concatenate([gnss.T.reshape(-1), wheel.T.reshape(-1)])
 
 
 def _motion(p: dict[str, jax.Array], own: jax.Array, stretch: Stretch) -> tuple[jax.Array, jax.Array]:
-    """Velocity (steps + 1, 3) in navigation and in vehicle axes."""
+    """Velocity (steps + 1, 3) of the antenna in navigation axes, and what wheels and axle show in the road's axes."""
     bias, scale, gyro_bias = (
         jnp.stack([p[f"accelerometer_bias_{axis}"] for axis in "xyz"]),
         p["accelerometer_scale"],
         jnp.stack([p[f"gyro_bias_{axis}"] for axis in "xyz"]),
     )
     f = correct_accelerometer(Accelerometer(bias=bias, scale=scale), stretch.f)
-    w = correct_gyro(Gyro(bias=gyro_bias), stretch.w, f)
-    states = own.reshape(-1, 6)
+    gyro_scale = jnp.stack([jnp.ones_like(p["gyro_scale_z"])] * 2 + [p["gyro_scale_z"]])
+    w = correct_gyro(Gyro(bias=gyro_bias, scale=gyro_scale), stretch.w, f)
+    start, drifts = own[:6], own[6:-3].reshape(-1, 6)
     turns = jax.lax.associative_scan(_product, rotvec_to_matrix(w * STEP))
     turns = _product(stretch.C_nb, jnp.concatenate([jnp.eye(3, dtype=f.dtype)[None], turns]))
-    first_turn = rotvec_to_matrix(states[0, :3])
+    first_turn = rotvec_to_matrix(start[:3])
     # Constant rate and force in the body during a step: to first order the force is turned by half the step.
     force = _turned(turns[:-1], f + jnp.cross(w, f) * STEP / 2) @ first_turn.T
-    # Kicks are so small that they add up as vectors.
-    begins = jnp.arange(f.shape[0]) // STEPS_OF_INTERVAL
-    in_noise = states.at[0].set(0)[begins]
-    first = jnp.concatenate([jnp.ones(1, bool), begins[1:] != begins[:-1]])[:, None]
-    kicks = jnp.where(first, in_noise, 0) * jnp.repeat(stretch.noise, 3) * (STEPS_OF_INTERVAL * STEP) ** 0.5
-    tilt = jnp.cumsum(kicks[:, :3], 0)
-    force = force + jnp.cross(tilt, force)
-    change = (force - jnp.stack([0 * stretch.gravity, 0 * stretch.gravity, stretch.gravity])) * STEP + kicks[:, 3:]
-    v_n = states[0, 3:] + jnp.concatenate([jnp.zeros((1, 3), f.dtype), jnp.cumsum(change, 0)])
-    tilt = jnp.concatenate([tilt[:1], tilt])
+    # Drifts are so small that they add up as vectors.
+    drift = drifts[jnp.arange(f.shape[0]) // STEPS_OF_INTERVAL] * jnp.repeat(stretch.noise[:2], 3)
+    drift = drift * (STEP / STEPS_OF_INTERVAL) ** 0.5
+    tilt = jnp.concatenate([jnp.zeros((1, 3), f.dtype), jnp.cumsum(drift[:, :3], 0)])
+    force = force + jnp.cross((tilt[:-1] + tilt[1:]) / 2, force)
+    change = (force - jnp.stack([0 * stretch.gravity, 0 * stretch.gravity, stretch.gravity])) * STEP + drift[:, 3:]
+    v_n = start[3:] + jnp.concatenate([jnp.zeros((1, 3), f.dtype), jnp.cumsum(change, 0)])
     mounting = euler_to_matrix(jnp.stack([0 * p["mounting_pitch"], p["mounting_pitch"], p["mounting_yaw"]]))
     v_level = (v_n - jnp.cross(tilt, v_n)) @ first_turn
     v_vehicle = _turned(jnp.swapaxes(turns, -1, -2), v_level) @ mounting.T
-    return v_n, v_vehicle
+    # Rates at the ends of the steps, and by them the velocity of a point one metre ahead of another.
+    w = (jnp.concatenate([w[:1], w]) + jnp.concatenate([w, w[-1:]])) / 2 @ mounting.T
+    per_metre = jnp.stack([jnp.zeros_like(w[:, 0]), w[:, 2], -w[:, 1]], -1)
+    v_antenna = v_n + p["antenna_lever_arm"] * (_turned(turns, per_metre @ mounting) @ first_turn.T)
+    forward, left, up = (v_vehicle - p["lever_arm"] * per_metre).T
+    nodes = jnp.arange(forward.size)
+    before, after = jnp.maximum(nodes - _LOOK, 0), jnp.minimum(nodes + _LOOK, forward.size - 1)
+    acceleration = (forward[after] - forward[before]) / ((after - before) * STEP)
+    up = up + p["weight_transfer"] / stretch.gravity * acceleration * forward
+    shown = forward * (1 + p["wheel_slip"] * acceleration)
+    return v_antenna, jnp.stack([shown, left, up], -1)
 
 
 def _product(a: jax.Array, b: jax.Array) -> jax.Array:
@@ -174,9 +197,13 @@ def _turned(matrices: jax.Array, vectors: jax.Array) -> jax.Array:
 
 
 def _at(t: jax.Array, values: jax.Array) -> jax.Array:
-    """Rows of a uniform series at other times, by the parabola through three neighbours: smooth in the time."""
+    """Rows of a uniform series at other times, by Catmull and Rom's cubic.
+
+    Its slope is continuous in the time: else a delay finds a minimum of its own wherever neighbours change.
+    """
     place = jnp.clip(t / STEP, 0, values.shape[0] - 1)
-    i = jnp.clip(jax.lax.stop_gradient(jnp.round(place)).astype(int), 1, values.shape[0] - 2)
+    i = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 1, values.shape[0] - 3)
     x = (place - i)[:, None]
-    before, here, after = values[i - 1], values[i], values[i + 1]
-    return here + x * (after - before) / 2 + x * x * (after - 2 * here + before) / 2
+    a, b, c, d = (values[i + k] for k in (-1, 0, 1, 2))
+    slope = (c - a) / 2
+    return b + x * (slope + x * (a - 2.5 * b + 2 * c - d / 2 + x * (1.5 * (b - c) + (d - a) / 2)))

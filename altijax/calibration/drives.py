@@ -26,9 +26,9 @@ from altijax.rotations import euler_to_matrix
 STRETCH = 20.0
 """Length of a stretch, s: long enough for a turn, short enough for the kicks of the IMU's noise to stay few."""
 
-NOISE = {"gyro": 2e-4, "accelerometer": 5e-3}
+NOISE = {"gyro": 2e-4, "accelerometer": 5e-3, "receiver": 0.02}
 """Assumed noise densities of the IMU on the road, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz), one-sided: consumer MEMS twice
-over, as vibration adds to it."""
+over, as vibration adds to it; and the error of the receiver's velocity that lasts as long as a stretch, m/s."""
 
 # First guesses of the observations' noise, m/s, in the order of GROUPS; the fit replaces them. No less than the last.
 _FIRST_STD, _LEAST_STD = (0.1, 0.2, 0.05, 0.1, 0.1), 0.005
@@ -195,7 +195,7 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     gravity : float
         Magnitude of gravity, m/s^2.
     noise : mapping, optional
-        Noise densities of ``gyro`` and ``accelerometer``, one-sided.
+        Noise densities of ``gyro`` and ``accelerometer``, one-sided, and the slow error of the ``receiver``, m/s.
 
     Returns
     -------
@@ -235,7 +235,7 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
                 w=w_mean[k],
                 C_nb=euler_to_matrix(jnp.asarray(euler)),
                 gravity=jnp.asarray(gravity),
-                noise=jnp.asarray([noise["gyro"], noise["accelerometer"]]) / 2**0.5,
+                noise=jnp.asarray([noise["gyro"] / 2**0.5, noise["accelerometer"] / 2**0.5, noise["receiver"]]),
                 t_gnss=t_gnss[epochs] - start,
                 v_gnss=np.nan_to_num(v_gnss[epochs]),
                 gnss_std=jnp.asarray(np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf)),

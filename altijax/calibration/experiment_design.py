@@ -39,7 +39,7 @@ _STEPS = 4 * STEPS_OF_INTERVAL
 def drive_information(
     manoeuvres: Manoeuvres,
     noise: Sequence[float] = (0.05, 0.1, 0.02, 0.05, 0.1),
-    imu_noise: Sequence[float] = (1.4e-4, 3.5e-3),
+    slow_noise: Sequence[float] = (1.4e-4, 3.5e-3, 0.02),
     *,
     minutes: int = 5,
     rate: int = 1,
@@ -52,8 +52,8 @@ def drive_information(
         How one leg of a minute is driven; the others are like it.
     noise : (5,) m/s, optional
         Standard deviations of the observations, in the order of `GROUPS`.
-    imu_noise : (2,) rad/sqrt(s), m/s/sqrt(s), optional
-        Random walk of attitude and velocity that the IMU's noise makes.
+    slow_noise : (3,) rad/sqrt(s), m/s/sqrt(s), m/s, optional
+        Random walk of attitude and velocity that the IMU's noise makes, and the receiver's slow error.
     minutes : int, optional
         Number of legs.
     rate : int, optional
@@ -61,7 +61,7 @@ def drive_information(
 
     Returns
     -------
-    information : (12, 12)
+    information : (17, 17)
         Inverse of the covariance that the data alone would give.
 
     Raises
@@ -70,7 +70,7 @@ def drive_information(
         If the shapes do not fit.
     """
     levels = require_shape("noise", jnp.asarray(noise), (5,))
-    walks = require_shape("imu_noise", jnp.asarray(imu_noise), (2,))
+    walks = require_shape("slow_noise", jnp.asarray(slow_noise), (3,))
     stretches = round(60 / (STEP * _STEPS))
     t = STEP * jnp.arange(stretches * _STEPS, dtype=levels.dtype)
     middle = town_drive(manoeuvres, t + STEP / 2, STANDARD_GRAVITY, legs=1)
@@ -118,9 +118,9 @@ def manoeuvre_gains(manoeuvres: Manoeuvres, *, minutes: int = 5, rate: int = 1) 
 
     Returns
     -------
-    bits : (12,)
+    bits : (17,)
         Information gained on each parameter, log2 of prior over posterior standard deviation.
-    added : (6, 12)
+    added : (6, 17)
         Change of these for each of `CHANGES`, from the gradient.
     """
     prior_std = jnp.asarray([row[1] for row in DRIVE_PARAMETERS.values()])
@@ -141,7 +141,7 @@ def driving_protocol(bits: ArrayLike, added: ArrayLike, wanted: tuple[str, ...] 
 
     Parameters
     ----------
-    bits, added : (12,), (6, 12)
+    bits, added : (17,), (6, 17)
         From `manoeuvre_gains`.
     wanted : tuple of str, optional
         Parameters that matter; the three least known by default.

@@ -9,6 +9,7 @@ from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
 from altijax.calibration.drive_model import DRIVE_PARAMETERS
+from altijax.constants import STANDARD_GRAVITY
 from altijax.doppler import DopplerReceiver, doppler_velocity
 from altijax.motions import Readings, ideal_readings, road_pose
 from altijax.roads import SpeedProfile, winding_road
@@ -115,8 +116,9 @@ def recorded_drive(
     ----------
     readings : Readings
         The motion, at uniform times.
-    parameters : (12,)
-        True values in the order of `DRIVE_PARAMETERS`; the sensors are otherwise as the records say.
+    parameters : (17,)
+        True values in the order of `DRIVE_PARAMETERS`; the sensors are otherwise as the records say. The motion is that
+        of the middle of the rear axle.
     accelerometer, gyro, receiver
         Records of the sensors, for their noise and rate.
     wheel_noise : () m/s
@@ -136,19 +138,37 @@ def recorded_drive(
     keys = jax.random.split(key, 4)
     dt = t[1] - t[0]
     mounting = euler_to_matrix(jnp.stack([0 * dt, p["mounting_pitch"], p["mounting_yaw"]]))
-    f, w = readings.f_b @ mounting, readings.w_b @ mounting
+    acceleration = jnp.gradient(readings.speed, dt)
+    squat = p["weight_transfer"] / STANDARD_GRAVITY * acceleration
+    body = euler_to_matrix(jnp.stack([0 * squat, squat, 0 * squat], -1))
+    pitching = jnp.stack([0 * squat, -jnp.asarray(jnp.gradient(squat, dt)), 0 * squat], -1)
+    f, w = (jnp.einsum("tji,tj->ti", body, x) for x in (readings.f_b, readings.w_b))
+    w = w + pitching
+    ahead = jnp.asarray([1.0, 0.0, 0.0], t.dtype)
+    per_metre = jnp.cross(w, ahead)
+    f = f + p["lever_arm"] * (jnp.cross(jnp.asarray(jnp.gradient(w, dt, axis=0)), ahead) + jnp.cross(w, per_metre))
+    at_antenna = (p["lever_arm"] + p["antenna_lever_arm"]) * per_metre
+    velocity = readings.velocity + jnp.einsum("tij,tjk,tk->ti", readings.C_nb, body, at_antenna)
+    f, w = f @ mounting, w @ mounting
     bias, rate_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
     accelerometer = replace(accelerometer, bias=bias, scale=p["accelerometer_scale"])
     t_gnss, v_gnss, valid = doppler_velocity(
-        replace(receiver, latency=p["gnss_delay"]), t, readings.velocity, epochs=epochs, key=keys[2]
+        replace(receiver, latency=p["gnss_delay"]), t, velocity, epochs=epochs, key=keys[2]
     )
     t_wheel = t[2:-2:2]
-    speed, _ = resample(t_wheel - p["wheel_delay"], t, readings.speed, jnp.inf)
+    slipping = readings.speed * (1 + p["wheel_slip"] * acceleration)
+    speed, _ = resample(t_wheel - p["wheel_delay"], t, slipping, jnp.inf)
     noise = wheel_noise * jax.random.normal(keys[3], speed.shape, t.dtype)
     return {
         "t": t,
         "f": accelerometer_output(accelerometer, f, dt, key=keys[0]),
-        "w": gyro_output(replace(gyro, bias=rate_bias), w, f, dt, key=keys[1]),
+        "w": gyro_output(
+            replace(gyro, bias=rate_bias, scale=jnp.stack([1 + 0 * dt, 1 + 0 * dt, p["gyro_scale_z"]])),
+            w,
+            f,
+            dt,
+            key=keys[1],
+        ),
         "t_gnss": t_gnss,
         "v_gnss": jnp.where(valid[:, None], v_gnss, jnp.nan),
         "t_wheel": t_wheel,

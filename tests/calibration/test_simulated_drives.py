@@ -23,7 +23,9 @@ def test_drive_stops_turns_and_climbs() -> None:
 
 
 def test_recorded_readings_are_the_ideal_ones_through_the_parameters() -> None:
-    truth = np.array([1.02, 0.1, 0.2, 0.1, -0.2, 0.05, 1.005, 0.002, -0.003, 0.004, 0.05, -0.02])
+    truth = np.array(
+        [1.02, 0.1, 0.2, 0.1, -0.2, 0.05, 1.005, 0.002, -0.003, 0.004, 0.05, -0.02, 1.004, 0.0, 0.0, 0.0, 0.0]
+    )
     recorded = recorded_drive(
         READINGS,
         truth,
@@ -38,7 +40,9 @@ def test_recorded_readings_are_the_ideal_ones_through_the_parameters() -> None:
     mounting = euler_to_matrix(jnp.array([0.0, p["mounting_pitch"], p["mounting_yaw"]]))
     f_vehicle = (recorded["f"] / 1.005 - jnp.array([0.1, -0.2, 0.05])) @ mounting.T
     np.testing.assert_allclose(f_vehicle, READINGS.f_b, atol=1e-9)
-    np.testing.assert_allclose((recorded["w"] - truth[7:10]) @ mounting.T, READINGS.w_b, atol=1e-9)
+    np.testing.assert_allclose(
+        (recorded["w"] / np.array([1, 1, 1.004]) - truth[7:10]) @ mounting.T, READINGS.w_b, atol=1e-9
+    )
     np.testing.assert_allclose(recorded["v_gnss"][30], READINGS.velocity[298], atol=1e-9)
     assert np.isnan(recorded["v_gnss"][0]).all()  # it would report what was before the drive
     np.testing.assert_allclose(recorded["wheel"][200] * 1.02, READINGS.speed[401], atol=1e-9)
