@@ -24,6 +24,10 @@ _ROUNDS, _FIRST = 4, 0.1
 # No reference and no model is better than this share of what the constants may change.
 _LEAST = 1e-5
 
+# Small steps are compiled by themselves one by one, whole functions at once.
+_identify = jax.jit(identify_information, static_argnames="names")
+_together = jax.jit(statistical_inefficiency)
+
 Residuals = Callable[[jax.Array], tuple[jax.Array, ...]]
 Found = tuple[jax.Array, jax.Array, tuple[jax.Array, ...]]
 
@@ -160,9 +164,7 @@ def calibration_from(
     known = prior.loc[names]
     units = known["uncertainty"].to_numpy(float)
     information = np.linalg.inv(covariance) - np.eye(len(names))
-    found = identify_information(
-        jnp.asarray(information / np.outer(units, units)), jnp.asarray(units), names=tuple(names)
-    )
+    found = _identify(jnp.asarray(information / np.outer(units, units)), jnp.asarray(units), names=tuple(names))
     std = np.sqrt(np.diag(covariance))
     table = pd.DataFrame(
         {
@@ -195,6 +197,6 @@ def _noise(r: np.ndarray) -> float:
         return 1.0
     means = np.sum(r, 1) / np.maximum(np.sum(there, 1), 1)
     rest = np.where(there, r - means[:, None], 0)
-    together = np.asarray(statistical_inefficiency(rest))
+    together = np.asarray(_together(rest))
     squares, counts = np.sum(rest**2, 1), np.sum(there, 1)
     return float(np.sqrt(np.sum(np.maximum(squares * together, (counts * means) ** 2)) / np.sum(counts)))

@@ -63,17 +63,19 @@ def calibrate_elevation(
             return _calibrate_fused(recordings, drives, references, fitted, names)
         prior = _prior(drives[0], names)
         mean, unit = (jnp.asarray(prior.loc[names, column].to_numpy(float)) for column in ("nominal", "uncertainty"))
-        targets = [(jnp.asarray(t[:n]), jnp.asarray(h[:n])) for (t, h), n in zip(references, fitted, strict=True)]
+        targets, whole = (
+            [(jnp.asarray(t[:n]), jnp.asarray(h[:n])) for (t, h), n in zip(references, counts, strict=True)]
+            for counts in (fitted, [t.size for t, _ in references])
+        )
         static = {"names": tuple(names), "method": method}
-        first = _residuals(jnp.zeros(len(names)), drives, targets, mean, unit, **static)
+        nominal = _residuals(jnp.zeros(len(names)), drives, whole, mean, unit, **static)
+        first = [r[:, :n] - jnp.mean(r[:, :n]) for r, n in zip(nominal, fitted, strict=True)]
         fit = fit_to_reference(
             lambda x, noise: _solve(x, noise, drives, targets, mean, unit, **static), len(names), first
         )
+        best = _residuals(jnp.asarray(fit.x), drives, whole, mean, unit, **static)
+        errors = [[np.asarray(r)[0] for r in pair] for pair in zip(nominal, best, strict=True)]
         constants = dict(zip(names, np.asarray(mean) + np.asarray(unit) * fit.x, strict=True))
-        errors = [
-            [np.asarray(_error(of, drive, target, method)) for of in ({}, constants)]
-            for drive, target in zip(drives, references, strict=True)
-        ]
         absorbed = _absorbed(drives, targets, constants, method, unit, fit.covariance, fit.noise)
         return calibration_from(
             method,
@@ -240,7 +242,6 @@ def _held_out(
     return held_out_table(rows)
 
 
-@partial(jax.jit, static_argnames="method")
 def _error(values: dict[str, jax.Array], drive: Drive, target: tuple[jax.Array, jax.Array], method: str) -> jax.Array:
     """Estimate less reference at the reference's times."""
     t, heights = target

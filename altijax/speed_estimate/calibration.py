@@ -336,12 +336,15 @@ def _outages(
         for start in starts:
             initial = initial_state(drive, start, None, None)
             track = run_filter(drive, start, AUTO_SENSORS, initial, NOMINAL_NOISE)
-            estimate = on_imu(drive, track, AUTO_SENSORS)
+            # Outages of one length are compiled once.
+            samples = drive.t <= start + OUTAGE
+            outage = replace(drive, t=drive.t[samples], f_b=drive.f_b[samples], w_b=drive.w_b[samples])
+            estimate = on_imu(outage, track, AUTO_SENSORS)
             if method != "filter":
-                dead_reckon(estimate, drive, track, start, AUTO_SENSORS, method, NOMINAL_NOISE)
+                dead_reckon(estimate, outage, track, start, AUTO_SENSORS, method, NOMINAL_NOISE)
             times = start + np.arange(0.5, OUTAGE + 0.1, 0.5)
             truth, near = _at(reference, times)
-            errors[kind, start] = (np.interp(times, drive.t, estimate["speed"]) - truth)[near]
+            errors[kind, start] = (np.interp(times, outage.t, estimate["speed"]) - truth)[near]
     halves = [
         [_rms(np.concatenate([errors[kind, start] for start in chosen] or [[]])) for kind in ("nominal", "fitted")]
         for chosen in (starts[starts + OUTAGE <= end], starts[starts >= end])

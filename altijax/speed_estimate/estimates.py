@@ -66,7 +66,8 @@ def estimate_speed(
         Last time, on the recording's time axis, whose aid may be used; by default the first second of the IMU, which
         gives the initial speed and pitch and next to nothing of the constants.
     calibration : Calibration, optional
-        Constants known beforehand; what remains of them is learned. A delay is that of the aid.
+        Constants known beforehand, as far as a speed depends on them; what remains of them is learned, the filter
+        beginning with their standard deviations. A delay is that of the aid.
     initial_speed : float, optional
         In m/s; by default the aid's of the first second.
     initial_pitch : float, optional

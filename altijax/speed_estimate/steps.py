@@ -7,7 +7,6 @@ import pandas as pd
 from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
-from altijax.calibration.parameters import PARAMETERS
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import gravity_at, imu_of, start_of
 from altijax.recordings import Recording
@@ -23,7 +22,6 @@ _VIBRATION_WINDOW = 0.5
 # while the aid said that it moved.
 _STILL_WINDOW, _STILL_FORCE, _STILL_RATE, _MOVING_SPEED = 2.0, 0.05, 0.004, 0.5
 
-_USED = set(PARAMETERS.index) - {"initial_vertical_speed", "lever_arm", "weight_transfer", "yaw_rate_bias"}
 # Of the states that a calibrated constant is the mean of.
 _MEANS = {"mounting_yaw": "travel_yaw", "mounting_pitch": "travel_pitch"}
 
@@ -50,7 +48,8 @@ class SpeedDrive:
 def drive_in_steps(recording: Recording, calibration: Calibration | None, until: float) -> SpeedDrive:
     """Readings of a recording, corrected by what was calibrated; `t_aid` are the aid's stamps less its delay.
 
-    The aid is kept whole, for `steps_until` to cut, but gravity is that of the places up to `until`.
+    Constants that no speed depends on, such as a vertical speed at the start, are left out. The aid is kept whole, for
+    `steps_until` to cut, but gravity is that of the places up to `until`.
     """
     imu, start = imu_of(recording), start_of(recording)
     t = imu.index.to_numpy(float) - start
@@ -58,7 +57,7 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
         raise ValueError(
             f"recording {recording.name!r} has no gyro, or less than {_SHORTEST} s of it: speed needs both"
         )
-    values = _constants(calibration)
+    values = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
     imu = correct_imu(imu, calibration)
     f_b, w_b = (imu[[f"{sensor}{axis}" for axis in "xyz"]].to_numpy(float) for sensor in "ag")
     mounting = Rotation.from_euler("ZY", [values.get("mounting_yaw", 0.0), -values.get("mounting_pitch", 0.0)])
@@ -99,15 +98,6 @@ def _states_std(calibration: Calibration | None, delay: str) -> np.ndarray:
     if delay in known:
         named["imu_delay"] = known[delay]
     return np.array([named.get(name, std) for name, std in STATES.items()])
-
-
-def _constants(calibration: Calibration | None) -> dict[str, float]:
-    values = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
-    unknown = sorted(set(values) - _USED)
-    if unknown:
-        used = ", ".join(sorted(_USED))
-        raise ValueError(f"{', '.join(unknown)} of the calibration means nothing for a speed; what does: {used}")
-    return values
 
 
 def _means(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -8,6 +8,7 @@ import pytest
 
 from altijax.calibration.records import Calibration, constants_table
 from altijax.recordings import Recording
+from altijax.speed_estimate.model import STATES
 from altijax.speed_estimate.steps import STEP, drive_in_steps, initial_state, steps_until
 from tests.made_drives import curvy_recording
 
@@ -53,7 +54,7 @@ def test_a_standing_car_is_seen(drive: Recording) -> None:
     assert not still[: round(29 / STEP)].any() and still[round(32 / STEP) :].all()
 
 
-def test_a_calibration_is_used_whole_or_refused(drive: Recording) -> None:
+def test_a_calibration_is_used_as_far_as_a_speed_depends_on_it(drive: Recording) -> None:
     plain = drive_in_steps(drive, None, 20.0)
     known = drive_in_steps(
         drive,
@@ -67,8 +68,17 @@ def test_a_calibration_is_used_whole_or_refused(drive: Recording) -> None:
     # nose up on the car: a level car reads part of gravity forward
     np.testing.assert_allclose(tilted.f_b[:, 0], plain.f_b @ [np.cos(0.1), 0, -np.sin(0.1)], rtol=1e-12)
     np.testing.assert_allclose(tilted.w_b[:, 1], plain.w_b[:, 1])
-    with pytest.raises(ValueError, match="initial_vertical_speed of the calibration means nothing for a speed"):
-        drive_in_steps(drive, calibration(initial_vertical_speed=0.1), 20.0)
+    known = drive_in_steps(drive, calibration(gyro_bias_y=0.003, mounting_yaw=0.1, initial_vertical_speed=1.0), 20.0)
+    turned = plain.w_b - [0, 0.003, 0]
+    np.testing.assert_allclose(known.w_b[:, 1], turned @ [np.sin(0.1), np.cos(0.1), 0], atol=1e-12)
+
+
+def test_what_was_calibrated_begins_with_its_own_error(drive: Recording) -> None:
+    known = calibration(gyro_bias_y=0.003, mounting_yaw=0.1, wheel_delay=0.2, gnss_delay=0.1)
+    known.table["std"] = [0.001, 0.002, 0.003, 0.004]
+    std = dict(zip(STATES, drive_in_steps(drive, known, 20.0).states_std, strict=True))
+    changed = {"gyro_bias_y": 0.001, "travel_yaw": 0.002, "imu_delay": 0.003}
+    assert std == STATES | changed
 
 
 def test_a_late_aid_does_not_serve_beyond_its_end(drive: Recording) -> None:
