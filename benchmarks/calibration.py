@@ -1,18 +1,22 @@
 """Calibration of a simulated five-minute drive: how fast, how good, and whether the error bars hold.
 
-    python benchmarks/calibration.py [--drives 500] [--rate 10]
+    python -m benchmarks.calibration [500] [--rate 10]
 
-Prints the time of a whole calibration of 12 parameters on 100 Hz data after compilation, the cost of a pipeline's
-value and gradient over that of its value, the memory of a reverse pass over a million samples, and for `--drives`
-drives with random true parameters the error of each parameter and how often its 95 % interval holds the truth. Each
-drive has its own parameters, drawn within 1.3 prior standard deviations, and its own noise; the road is the same. The
-IMU has the white noise of a consumer MEMS, without the wandering of its biases; there is no side slip and no lever arm,
-as on a real road there would be.
+Prints the cost of a pipeline's value and gradient over that of its value, the memory of a reverse pass over a million
+samples, the time of a whole calibration of 12 parameters on 100 Hz data after compilation, and for the number of drives
+asked for with random true parameters the error of each parameter beside its limit and how often its 95 % interval holds
+the truth. Each drive has its own parameters, drawn within 1.3 prior standard deviations, and its own noise; the road is
+the same. The simulated errors are those that the model knows, so this tells whether the fit is right, not whether the
+model is: the IMU has the white noise of a consumer MEMS, without the wandering of its biases, the receiver white noise
+without a slow error (which the fit is told), and there is no side slip. Nothing is scored that was fitted to: the truth
+is the simulation's.
 """
 
 import argparse
 import resource
 import time
+from collections.abc import Callable
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -22,6 +26,7 @@ import pandas as pd
 import altijax as aj
 from altijax.calibration.drive_model import DRIVE_PARAMETERS
 from altijax.calibration.drives import calibrate_stretches, drive_stretches
+from altijax.calibration.identifiability import describe_undetermined
 from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, town_drive
 
 GRAVITY, DENSITY = 9.80665, {"gyro": float(aj.MEMS_GYRO.noise_density)}
@@ -31,10 +36,23 @@ NOMINAL = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
 PRIOR_STD = np.array([row[1] for row in DRIVE_PARAMETERS.values()])
 
 
-def drives(count: int, rate: float) -> pd.DataFrame:
-    """Errors and standard deviations of every parameter on every drive, and the seconds each fit took."""
+LIMITS = {
+    "wheel_scale": 1e-3,
+    "wheel_delay": 5e-3,
+    "gnss_delay": {10.0: 5e-3, 1.0: 20e-3},
+    "accelerometer_bias_x": 5e-3,
+    "accelerometer_bias_y": 5e-3,
+    "accelerometer_bias_z": 5e-3,
+    "mounting_pitch": np.radians(0.2),
+    "mounting_yaw": np.radians(0.2),
+}
+"""Largest root mean square errors wanted; of the receiver's delay by its epochs per second."""
+
+
+def recorder(manoeuvres: Manoeuvres, rate: float) -> Callable[[np.ndarray, int], dict[str, np.ndarray]]:
+    """What sensors with given parameters record of a drive, by the number of the drive."""
     t = jnp.arange(30001) / 100
-    readings = jax.jit(lambda t: town_drive(Manoeuvres(), t, GRAVITY))(t)
+    readings = jax.jit(lambda t: town_drive(manoeuvres, t, GRAVITY))(t)
     record = jax.jit(
         lambda truth, key: recorded_drive(
             readings,
@@ -47,75 +65,119 @@ def drives(count: int, rate: float) -> pd.DataFrame:
             key=key,
         )
     )
+    return lambda truth, number: {name: np.asarray(x) for name, x in record(truth, jax.random.key(number)).items()}
+
+
+def drives(count: int, rate: float) -> pd.DataFrame:
+    """Errors and standard deviations of every parameter on every drive, and the seconds each fit took."""
+    record = recorder(Manoeuvres(), rate)
     rng = np.random.default_rng(0)
     rows = []
     for number in range(count):
         truth = NOMINAL + PRIOR_STD * np.clip(rng.normal(size=PRIOR_STD.size), -1.3, 1.3)
-        recorded = {name: np.asarray(value) for name, value in record(truth, jax.random.key(number)).items()}
-        start = time.perf_counter()
+        recorded = record(truth, number)
         calibration = calibrate_stretches(drive_stretches(recorded, GRAVITY, DENSITY))
-        seconds = time.perf_counter() - start
+        found = calibration.identification
         table = calibration.table
         rows.append(
             pd.DataFrame(
                 {
                     "error": table["value"] - truth,
                     "std": table["std"],
-                    "seconds": seconds,
-                    "known": calibration.identification.rank == PRIOR_STD.size,
+                    "known": int(found.rank) == PRIOR_STD.size,
+                    "silent": int(found.rank) < PRIOR_STD.size and not describe_undetermined(found),
                 }
             )
         )
     return pd.concat(rows, keys=range(count))
 
 
-def cost_of_gradient(samples: int) -> tuple[float, float]:
-    """Value and gradient over value of the elevation by the slope, and peak memory so far in GB."""
-    t = jnp.arange(samples) / 100
-    speed = 12 + 3 * jnp.sin(0.1 * t)
-    f_x = 0.3 * jnp.cos(0.1 * t) + 0.3 * jnp.sin(0.03 * t)
+def seconds_of_twelve(rate: float) -> float:
+    """Best of three calibrations of the first 12 parameters on 5 min of 100 Hz data, after compilation."""
+    names = list(DRIVE_PARAMETERS)[:12]
+    recorded = recorder(Manoeuvres(), rate)(NOMINAL, 0)
+    best = np.inf
+    for _ in range(4):  # the first compiles
+        start = time.perf_counter()
+        calibrate_stretches(drive_stretches(recorded, GRAVITY, DENSITY), names)
+        best = min(best, time.perf_counter() - start)
+    return best
 
-    def misfit(x: jax.Array) -> jax.Array:
+
+def straight_road(rate: float) -> str:
+    """What is said of a drive that cannot tell biases from tilts, and the errors in standard deviations."""
+    truth = NOMINAL + PRIOR_STD * np.clip(np.random.default_rng(1).normal(size=PRIOR_STD.size), -1.3, 1.3)
+    recorded = recorder(replace(Manoeuvres(), turning=0.0, slope=0.0), rate)(truth, 0)
+    calibration = calibrate_stretches(drive_stretches(recorded, GRAVITY, DENSITY))
+    table = calibration.table
+    worst = float(np.max(np.abs((table["value"] - truth) / table["std"])))
+    said = "\n".join(describe_undetermined(calibration.identification))
+    return f"straight, level road: largest error {worst:.1f} standard deviations; it says:\n{said}"
+
+
+def cost_of_gradient(samples: int) -> tuple[float, float, float]:
+    """Value and gradient over value of the elevation by the slope; GB of the pass, and of the process at its peak."""
+    t = jnp.arange(samples) / 100
+    # Arguments, not constants of the compiled function: XLA would keep and fold copies of those.
+    data = (t, 12 + 3 * jnp.sin(0.1 * t), 0.3 * jnp.cos(0.1 * t) + 0.3 * jnp.sin(0.03 * t))
+
+    def misfit(x: jax.Array, t: jax.Array, speed: jax.Array, f_x: jax.Array) -> jax.Array:
         height, _ = aj.elevation_by_slope(t, f_x / x[0] - x[1], speed * x[2], GRAVITY)
         return jnp.mean(height**2)
 
     x = jnp.array([1.0, 0.0, 1.0])
-    value, both = jax.jit(misfit), jax.jit(jax.value_and_grad(misfit))
-    assert np.allclose(value(x), both(x)[0])
+    value, both = (jax.jit(f).lower(x, *data).compile() for f in (misfit, jax.value_and_grad(misfit)))
+    assert np.allclose(value(x, *data), both(x, *data)[0])
     spent = []
     for function in (value, both):
-        jax.block_until_ready(function(x))
         best = np.inf
         for _ in range(7):
             start = time.perf_counter()
-            jax.block_until_ready(function(x))
+            jax.block_until_ready(function(x, *data))
             best = min(best, time.perf_counter() - start)
         spent.append(best)
-    return spent[1] / spent[0], resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    used = both.memory_analysis()
+    own = (used.temp_size_in_bytes + used.argument_size_in_bytes + used.output_size_in_bytes) / 2**30
+    return spent[1] / spent[0], own, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+
+def accuracy(found: pd.DataFrame, rate: float) -> pd.DataFrame:
+    """Errors beside their limits, and how often the intervals hold the truth, one row a parameter."""
+    by_name = found.groupby(level=1, sort=False)
+    limits = {name: limit.get(rate, np.nan) if isinstance(limit, dict) else limit for name, limit in LIMITS.items()}
+    inside = found["error"].abs() < 1.96 * found["std"]
+    return pd.DataFrame(
+        {
+            "rms error": by_name["error"].apply(lambda e: float(np.sqrt(np.mean(e**2)))),
+            "limit": pd.Series(limits).reindex(list(DRIVE_PARAMETERS)),
+            "mean std": by_name["std"].mean(),
+            "mean error / its std": by_name["error"].mean() / by_name["error"].sem(),
+            "coverage of 95 %": inside.groupby(level=1, sort=False).mean(),
+            "unit": pd.Series({name: row[2] for name, row in DRIVE_PARAMETERS.items()}),
+        }
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--drives", type=int, default=500)
+    parser.add_argument("drives", type=int, nargs="?", default=500)
     parser.add_argument("--rate", type=float, default=10.0, help="GNSS epochs per second")
     options = parser.parse_args()
     jax.config.update("jax_enable_x64", True)
     for samples in (30_000, 1_000_000):
-        ratio, memory = cost_of_gradient(samples)
-        print(f"value and gradient over value, {samples} samples: {ratio:.1f}; peak memory so far {memory:.2f} GB")
+        ratio, own, peak = cost_of_gradient(samples)
+        print(
+            f"value and gradient over value, {samples} samples: {ratio:.1f} (limit 5); "
+            f"memory of the pass {own:.2f} GB, of the process at its peak {peak:.2f} GB (limit 1)"
+        )
+    print(f"calibration of 12 parameters: {seconds_of_twelve(options.rate):.1f} s (limit 5)")
+    print(straight_road(options.rate))
     found = drives(options.drives, options.rate)
-    seconds = found["seconds"]
-    print(f"calibration of 12 parameters: median {seconds.median():.1f} s, first {seconds.iloc[0]:.1f} s")
-    print(f"all directions determined in {found['known'].mean():.0%} of {options.drives} drives")
-    table = pd.DataFrame(
-        {
-            "rms error": found["error"].groupby(level=1, sort=False).apply(lambda e: float(np.sqrt(np.mean(e**2)))),
-            "mean std": found["std"].groupby(level=1, sort=False).mean(),
-            "coverage of 95 %": (found["error"].abs() < 1.96 * found["std"]).groupby(level=1, sort=False).mean(),
-            "unit": [row[2] for row in DRIVE_PARAMETERS.values()],
-        }
+    known, silent = (found.groupby(level=0)[name].first() for name in ("known", "silent"))
+    print(
+        f"{options.drives} drives: all directions determined in {known.mean():.0%}, silently missing in {silent.sum()}"
     )
-    print(table.to_string(float_format=lambda x: f"{x:.5f}"))
+    print(accuracy(found, options.rate).to_string(float_format=lambda x: f"{x:.5f}"))
 
 
 if __name__ == "__main__":
