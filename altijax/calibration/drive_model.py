@@ -142,7 +142,9 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
     v_antenna, v_wheels = _motion(p, own, stretch)
     at_epochs = _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:]
     gnss = (stretch.v_gnss - at_epochs) / stretch.gnss_std[:, jnp.asarray([0, 0, 1])]
-    at_samples = _at(stretch.t_wheel - p["wheel_delay"], v_wheels)
+    # Standing still sideways and upwards holds at any time, whatever the wheels' stamps.
+    rolled, still = _at(stretch.t_wheel - p["wheel_delay"], v_wheels[:, :1]), _at(stretch.t_wheel, v_wheels[:, 1:])
+    at_samples = jnp.concatenate([rolled, still], -1)
     shown = jnp.stack([p["wheel_scale"] * stretch.wheel, 0 * stretch.wheel, 0 * stretch.wheel], -1)
     wheel = (shown - at_samples) / stretch.wheel_std
     return jnp.concatenate([gnss.T.reshape(-1), wheel.T.reshape(-1)])

@@ -78,7 +78,8 @@ def calibrate_drive(
     Parameters
     ----------
     recordings : Recording or several
-        Each with six-axis IMU, GNSS velocities (with climb, as far as there is one) and wheel speeds of one car.
+        Each with six-axis IMU and GNSS velocities (with climb, as far as there is one) of one car, and its wheel speeds
+        if there are any; else what concerns the wheels stays undetermined.
     parameters : sequence of str, optional
         Names out of `DRIVE_PARAMETERS`; the others stay nominal. All by default.
     until : float, optional
@@ -191,7 +192,7 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     Parameters
     ----------
     recorded : mapping
-        t, f, w (IMU); t_gnss, v_gnss, NaN where missing; t_wheel, wheel.
+        t, f, w (IMU); t_gnss, v_gnss; t_wheel, wheel; of the velocities and speeds NaN where missing.
     gravity : float
         Magnitude of gravity, m/s^2.
     noise : mapping, optional
@@ -225,6 +226,8 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
         epochs = _inside(t_gnss, start, used_to) & np.isfinite(v_gnss[:, :2]).all(1)
         samples = _inside(t_wheel, start, used_to)
         used_to = start + _MARGIN + STRETCH
+        rolled = np.where(np.isfinite(wheel[samples]), _FIRST_STD[2], np.inf)
+        still = np.broadcast_to(np.asarray(_FIRST_STD[3:])[:, None], (2, samples.sum()))
         f_first = f_mean[k, : round(2 / STEP)].mean(0)
         euler = [np.arctan2(f_first[1], f_first[2]), np.arctan2(f_first[0], np.hypot(*f_first[1:]))]
         euler.append(np.interp(start, t, heading))
@@ -240,8 +243,8 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
                 v_gnss=np.nan_to_num(v_gnss[epochs]),
                 gnss_std=jnp.asarray(np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf)),
                 t_wheel=t_wheel[samples] - start,
-                wheel=wheel[samples],
-                wheel_std=jnp.asarray(np.broadcast_to(_FIRST_STD[2:], (samples.sum(), 3))),
+                wheel=np.nan_to_num(wheel[samples]),
+                wheel_std=jnp.asarray(np.stack([rolled, *still], -1)),
             )
         )
     return _stacked(pieces)
@@ -250,20 +253,25 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
 def _of_recording(recording: Recording) -> tuple[Stretch, np.ndarray]:
     """Stretches of a recording and their starts on its time axis; those with gaps in the IMU are left out."""
     imu, start = imu_of(recording), start_of(recording)
-    if recording.gnss is None or recording.wheel is None or not {"gx", "gy", "gz"} <= set(imu):
+    if recording.gnss is None or not {"gx", "gy", "gz"} <= set(imu):
         raise ValueError(
-            f"recording {recording.name!r} lacks a stream: a drive's calibration needs a gyro (gx, gy, gz in the IMU), "
-            "GNSS velocities and wheel speeds"
+            f"recording {recording.name!r} lacks a stream: a drive's calibration needs a gyro (gx, gy, gz in the IMU) "
+            "and GNSS velocities; wheel speeds help"
         )
     t = imu.index.to_numpy(float) - start
+    t_wheel = np.arange(t[0], t[-1], _BIN)
+    wheel = np.full(t_wheel.size, np.nan)
+    if recording.wheel is not None:
+        t_wheel = recording.wheel.index.to_numpy(float) - start
+        wheel = recording.wheel["speed"].to_numpy(float)
     recorded = {
         "t": t,
         "f": imu[["ax", "ay", "az"]].to_numpy(float),
         "w": imu[["gx", "gy", "gz"]].to_numpy(float),
         "t_gnss": recording.gnss.index.to_numpy(float) - start,
         "v_gnss": recording.gnss[["v_e", "v_n", "v_u"]].to_numpy(float),
-        "t_wheel": recording.wheel.index.to_numpy(float) - start,
-        "wheel": recording.wheel["speed"].to_numpy(float),
+        "t_wheel": t_wheel,
+        "wheel": wheel,
     }
     stretches = drive_stretches(recorded, gravity_at(recording))
     starts = _starts(t)

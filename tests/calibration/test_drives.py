@@ -70,13 +70,24 @@ def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
     assert part.held_out.loc["wheel", "fitted"] < part.held_out.loc["wheel", "nominal"]
 
 
+def test_without_wheels_the_others_are_found_and_theirs_are_named(data_dir: Path) -> None:
+    calibration = calibrate_drive(read_recording(data_dir / "rtk-drive"))
+    table = calibration.table
+    wheels = ["wheel_scale", "wheel_delay", "wheel_slip"]
+    np.testing.assert_allclose(table.loc[wheels, "std"], table.loc[wheels, "prior_std"], rtol=1e-6)
+    assert all(f"less of {name} than" in str(calibration) for name in wheels)
+    # a town's corners tell where axle and antenna are
+    assert table["bits"][["lever_arm", "antenna_lever_arm", "mounting_pitch", "mounting_yaw"]].min() > 3
+    assert table["std"]["gnss_delay"] < 0.02 and 0 <= table["value"]["gnss_delay"] < 0.12
+
+
 def test_mistakes_are_named(data_dir: Path) -> None:
     with pytest.raises(ValueError, match="shorter than a stretch of 21 s"):
         zeros = np.zeros((50, 3))
         t = np.arange(50) / 10
         drive_stretches({"t": t, "f": zeros, "w": zeros, "t_gnss": t, "v_gnss": zeros, "t_wheel": t, "wheel": t}, 9.8)
     with pytest.raises(ValueError, match="lacks a stream"):
-        calibrate_drive(read_recording(data_dir / "umn-thor75"))
+        calibrate_drive(replace(read_recording(data_dir / "umn-thor75"), gnss=None))
     stretches = drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665)
     with pytest.raises(ValueError, match="parameters must be different names out of wheel_scale"):
         calibrate_stretches(stretches, ["wheel_size"])
