@@ -181,7 +181,7 @@ def plot_calibration_correlation(calibration: Calibration, *, ax: Axes | None = 
     ax.set_xticks(range(len(names)), names, rotation=40, ha="right", rotation_mode="anchor")
     ax.set_yticks(range(len(names)), names)
     ax.set_title(f"Correlation of constants, calibration of {calibration.method!r}")
-    ax.figure.colorbar(image, ax=ax, label="correlation")
+    ax.figure.colorbar(image, ax=ax, label="correlation", shrink=0.7)
     return ax
 
 
