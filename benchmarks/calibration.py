@@ -112,7 +112,8 @@ def straight_road(rate: float) -> str:
     table = calibration.table
     worst = float(np.max(np.abs((table["value"] - truth) / table["std"])))
     said = "\n".join(describe_undetermined(calibration.identification))
-    return f"straight, level road: largest error {worst:.1f} standard deviations; it says:\n{said}"
+    state = "converged" if calibration.converged else "NOT converged"
+    return f"straight, level road: {state}, largest error {worst:.1f} standard deviations; it says:\n{said}"
 
 
 def cost_of_gradient(samples: int) -> tuple[float, float, float]:

@@ -52,6 +52,8 @@ class DriveCalibration:
         Standard deviation of each kind of observation, as found, m/s; it includes their correlation.
     nis : float
         Normalised innovation squared per degree of freedom with that noise.
+    converged : bool
+        False where the steps were used up, as on a drive that leaves much open: then the bars say too little.
     held_out : DataFrame
         Root mean square of the weighted residuals of each kind with nominal and with fitted parameters, on the
         stretches that were held out, and whether the fit made it worse; empty where none were.
@@ -61,11 +63,14 @@ class DriveCalibration:
     identification: Identification
     noise: pd.Series
     nis: float
+    converged: bool
     held_out: pd.DataFrame
 
     def __repr__(self) -> str:
         parts = [self.table.round(5).to_string(), str(self.noise.round(4).to_dict()), f"NIS {self.nis:.2f}"]
         said = str(self.identification).splitlines()[1 + len(self.identification.names) :]
+        if not self.converged:
+            said = ["The fit did not converge: values and bars are not to be trusted.", *said]
         held_out = [] if self.held_out.empty else [self.held_out.round(3).to_string()]
         return "\n".join([*parts, *said, *held_out])
 
@@ -169,6 +174,7 @@ def calibrate_stretches(
         identification=found,
         noise=pd.Series(noise, GROUPS, name="std"),
         nis=float(fit.nis),
+        converged=bool(fit.converged),
         held_out=held_out,
     )
 

@@ -38,6 +38,7 @@ drive = jax.jit(lambda manoeuvres: town_drive(manoeuvres, jnp.arange(30001) / 10
 def test_five_minutes_with_turns() -> None:
     calibration = calibrate_stretches(drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665, DENSITY))
     table = calibration.table
+    assert calibration.converged
     error = np.abs(table["value"] - TRUTH)
     limits = {"wheel_scale": 1e-3, "gnss_delay": 5e-3, "wheel_delay": 5e-3}
     limits |= {f"accelerometer_bias_{axis}": 5e-3 for axis in "xy"}
