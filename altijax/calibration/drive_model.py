@@ -184,7 +184,9 @@ def _motion(p: dict[str, jax.Array], own: jax.Array, stretch: Stretch) -> tuple[
     nodes = jnp.arange(forward.size)
     before, after = jnp.maximum(nodes - _LOOK, 0), jnp.minimum(nodes + _LOOK, forward.size - 1)
     acceleration = (forward[after] - forward[before]) / ((after - before) * STEP)
-    up = up + p["weight_transfer"] / stretch.gravity * acceleration * forward
+    squat = p["weight_transfer"] / stretch.gravity * acceleration
+    cos, sin = jnp.cos(squat), jnp.sin(squat)
+    forward, up = forward * cos - up * sin, forward * sin + up * cos
     shown = forward * (1 + p["wheel_slip"] * acceleration)
     return v_antenna, jnp.stack([shown, left, up], -1)
 
