@@ -225,6 +225,7 @@ def course_attitude(v_n: ArrayLike) -> jax.Array:
 @jax.custom_jvp
 def _minimum(f_b: jax.Array, f_n: jax.Array, euler0: jax.Array, ratio: jax.Array) -> tuple[jax.Array, jax.Array]:
     """Change of `euler0` that minimises the cost, and the status of the fit; for one epoch or some."""
+    f_b, f_n = _finite(f_b, f_n)
     change, converged = _epoch_steps.descend(
         *map(_components, (f_b, f_n, euler0, jnp.zeros_like(euler0), jnp.broadcast_to(ratio, euler0.shape)))
     )
@@ -241,6 +242,7 @@ def _lowest(
     starts: int, f_b: jax.Array, f_n: jax.Array, euler0: jax.Array, ratio: jax.Array
 ) -> tuple[jax.Array, jax.Array]:
     """The lowest of the minima found from `_minimum` and from there turned about the specific force."""
+    f_b, f_n = _finite(f_b, f_n)
     first, _ = _minimum(f_b, f_n, euler0, ratio)
     angles = jnp.arange(starts, dtype=euler0.dtype) * (2 * jnp.pi / starts)
     length = _safe.norm(f_n)
@@ -269,8 +271,9 @@ def _minima(f_b: jax.Array, f_n: jax.Array, euler0: jax.Array, ratio: jax.Array)
     def fit_chunk(number: jax.Array, found: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         # The last chunk reaches back into the one before: nothing is padded.
         start = jnp.minimum(number * chunk, epochs - chunk)
-        b, n, e = (_components(jax.lax.dynamic_slice(v, (start, 0), (chunk, 3))) for v in (f_b, f_n, euler0))
-        change, arrived = _epoch_steps.stride(b, n, e, ratios)
+        b, n, e = (jax.lax.dynamic_slice(v, (start, 0), (chunk, 3)) for v in (f_b, f_n, euler0))
+        b, n = _finite(b, n)
+        change, arrived = _epoch_steps.stride(_components(b), _components(n), _components(e), ratios)
         return (
             jax.lax.dynamic_update_slice(found[0], jnp.stack(change, -1), (start, 0)),
             jax.lax.dynamic_update_slice(found[1], arrived, (start,)),
@@ -302,6 +305,8 @@ def _minima_jvp(primals: tuple, tangents: tuple) -> tuple:
 
 def _with_derivative(minimum: tuple[jax.Array, jax.Array], primals: tuple, tangents: tuple) -> tuple:
     change, status = minimum
+    f_b, f_n, euler0, ratio = primals
+    primals = *_finite(f_b, f_n), euler0, ratio
     arguments, directions = tuple(map(_components, primals)), tuple(map(_components, tangents))
     direction = _epoch_cost.derivative_of_minimum(_components(change), arguments, directions)
     return minimum, (jnp.stack(direction, -1), zero_from_primal(status))
@@ -319,12 +324,20 @@ def _fit(
     prior_std = require_shape("prior_std", prior_std, () if jnp.ndim(prior_std) == 0 else (3,))
     prior_std = jnp.broadcast_to(prior_std, 3).astype(dtype)
     measurement_std = require_shape("measurement_std", measurement_std, ()).astype(dtype)
-    # An epoch without finite data is one without data.
-    finite = (jnp.isfinite(f_b) & jnp.isfinite(f_n)).all(-1)
-    f_b, f_n = (jnp.where(finite[..., None], v, 0).astype(dtype) for v in (f_b, f_n))
-    euler0 = euler0.astype(dtype)
+    f_b, f_n, euler0 = (v.astype(dtype) for v in (f_b, f_n, euler0))
     change, status = minimiser(f_b, f_n, euler0, measurement_std / prior_std)
-    return _described(change, jnp.where(finite, status, NOT_FINITE), f_b, f_n, euler0, prior_std, measurement_std)
+    status = jnp.where(_are_finite(f_b, f_n), status, NOT_FINITE)
+    return _described(change, status, *_finite(f_b, f_n), euler0, prior_std, measurement_std)
+
+
+def _are_finite(f_b: jax.Array, f_n: jax.Array) -> jax.Array:
+    return (jnp.isfinite(f_b) & jnp.isfinite(f_n)).all(-1)
+
+
+def _finite(f_b: jax.Array, f_n: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """An epoch without finite data is one without data; said chunk by chunk, as copies of the whole batch are slow."""
+    finite = _are_finite(f_b, f_n)[..., None]
+    return jnp.where(finite, f_b, 0), jnp.where(finite, f_n, 0)
 
 
 def _components(vectors: jax.Array) -> _epoch_cost.Vector:

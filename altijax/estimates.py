@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.drives import calibrate_drive
+from altijax.calibration.drives import NOT_CONVERGED, calibrate_drive
 from altijax.calibration.identifiability import describe_undetermined
 from altijax.calibration.parameters import ACCEPTED, PARAMETERS, require_parameters
 from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table, worse_where_held_out
@@ -126,6 +126,6 @@ def _calibrate_drive(recordings: list[Recording], names: list[str], until: float
         table=constants_table(drive.table).loc[names],
         correlation=pd.DataFrame(drive.identification.correlation, order, order).astype(float).loc[names, names],
         absorbed=pd.DataFrame(index=names),
-        undetermined=tuple(describe_undetermined(drive.identification)),
+        undetermined=(*([] if drive.converged else [NOT_CONVERGED]), *describe_undetermined(drive.identification)),
         held_out=held_out_table(rows),
     )

@@ -53,3 +53,15 @@ def test_a_drive_needs_no_reference_and_serves_every_verb() -> None:
     motion = estimates.estimate_motion(recording, method="window", calibration=found)
     assert np.isfinite(speed.to_numpy(float)).all() and np.isfinite(motion.to_numpy(float)).all()
     assert motion.attrs["delay"] == found.values["gnss_delay"]
+
+
+def test_a_drive_that_did_not_converge_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    recording = altijax.load_dataset("hill-road")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        found = altijax.calibrate_drive(recording, ["gyro_bias_z"], until=45.0)
+    monkeypatch.setattr(estimates, "calibrate_drive", lambda *_, **__: replace(found, converged=False))
+    with pytest.warns(UserWarning) as said:
+        calibration = estimates.calibrate(recording, "gyro_bias_z", method="drive", until=45.0)
+    assert any("did not converge" in str(warning.message) for warning in said)
+    assert "did not converge" in repr(calibration) and "did not converge" in repr(replace(found, converged=False))

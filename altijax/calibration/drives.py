@@ -26,6 +26,8 @@ from altijax.rotations import euler_to_matrix
 STRETCH = 20.0
 """Length of a stretch, s: long enough for a turn, short enough for the kicks of the IMU's noise to stay few."""
 
+NOT_CONVERGED = "The fit did not converge: values and bars are not to be trusted."
+
 NOISE = {"gyro": 2e-4, "accelerometer": 5e-3, "receiver": 0.02}
 """Assumed noise densities of the IMU on the road, rad/s/sqrt(Hz) and m/s^2/sqrt(Hz), one-sided: consumer MEMS twice
 over, as vibration adds to it; and the error of the receiver's velocity that lasts as long as a stretch, m/s."""
@@ -70,7 +72,7 @@ class DriveCalibration:
         parts = [self.table.round(5).to_string(), str(self.noise.round(4).to_dict()), f"NIS {self.nis:.2f}"]
         said = str(self.identification).splitlines()[1 + len(self.identification.names) :]
         if not self.converged:
-            said = ["The fit did not converge: values and bars are not to be trusted.", *said]
+            said = [NOT_CONVERGED, *said]
         held_out = [] if self.held_out.empty else [self.held_out.round(3).to_string()]
         return "\n".join([*parts, *said, *held_out])
 
