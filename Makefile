@@ -10,7 +10,7 @@ reproduce: $(READY)  ## every paper's table beside ours, then real drives where 
 	$(BIN)/python -m papers_repro
 
 test: $(READY)  ## all tests
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 lint: $(READY)
 	$(BIN)/ruff check .

@@ -1,6 +1,7 @@
 """What all tests share: double precision, and the folder of real recordings."""
 
 import os
+from collections.abc import Iterator
 from pathlib import Path
 
 import jax
@@ -18,3 +19,10 @@ def data_dir() -> Path:
     if not Path(folder).is_dir():
         pytest.fail(f"ALTIJAX_DATA_DIR is not a folder: {folder}")
     return Path(folder)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _forget_compiled_functions() -> Iterator[None]:
+    """Every compiled function holds memory maps, and a process that uses up the 65,530 that Linux grants it crashes."""
+    yield
+    jax.clear_caches()
