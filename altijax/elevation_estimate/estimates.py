@@ -92,7 +92,7 @@ def score_elevation(estimate: pd.DataFrame, recording: Recording, *, after: floa
     score : Series
         rms (m) with the first reference height in common, rms_without_offset (m), end_error (m), relief (m, highest
         less lowest reference), way (m), way_per_error (the n of an accuracy 1/n of the end error), and coverage within
-        one and two standard deviations.
+        one and two standard deviations of heights above the recording's first, whatever ``after`` is.
 
     Raises
     ------
@@ -100,19 +100,20 @@ def score_elevation(estimate: pd.DataFrame, recording: Recording, *, after: floa
         If the recording has no reference heights in the interval.
     """
     t, heights = reference_heights(recording)
-    keep = t > (-np.inf if after is None else after - start_of(recording))
+    t = t + start_of(recording)
+    keep = t > (-np.inf if after is None else after)
     if not keep.any():
         raise ValueError(f"recording {recording.name!r} has no reference heights after {after} s")
-    start = start_of(recording)
-    t, heights = t[keep] + start, heights[keep]
-    at_reference = {
-        name: np.interp(t, estimate.index, estimate[name]) for name in ("elevation", "elevation_std", "way")
-    }
-    error = at_reference["elevation"] - heights
-    error -= error[0]
-    # relative to the first height scored, which is known
-    std = np.sqrt(np.maximum(at_reference["elevation_std"] ** 2 - at_reference["elevation_std"][0] ** 2, 0))
-    way = at_reference["way"][-1] - at_reference["way"][0]
+    elevation, std, ways = (
+        np.interp(t, estimate.index, estimate[name]) for name in ("elevation", "elevation_std", "way")
+    )
+    # Bars are of heights above the start, so what they are held against is too, whatever part of the drive is scored.
+    above_start = elevation - elevation[0] - (heights - heights[0])
+    std = np.sqrt(np.maximum(std**2 - std[0] ** 2, 0))
+    barred = keep & (np.arange(t.size) > 0)
+    error, heights, ways = above_start[keep], heights[keep], ways[keep]
+    error = error - error[0]
+    way = ways[-1] - ways[0]
     with jax.enable_x64(True):
         score = {
             "rms": metrics.rms(error),
@@ -121,8 +122,8 @@ def score_elevation(estimate: pd.DataFrame, recording: Recording, *, after: floa
             "relief": np.ptp(heights),
             "way": way,
             "way_per_error": metrics.accuracy_denominator(way, error[-1]),
-            "within_1_std": metrics.coverage(error[1:], std[1:], 1.0),
-            "within_2_std": metrics.coverage(error[1:], std[1:], 2.0),
+            "within_1_std": metrics.coverage(above_start[barred], std[barred], 1.0),
+            "within_2_std": metrics.coverage(above_start[barred], std[barred], 2.0),
         }
         return pd.Series({name: float(value) for name, value in score.items()})
 

@@ -14,7 +14,9 @@ from altijax.elevation_estimate.model import elevation_and_sensitivity
 from altijax.elevation_estimate.smoother import (
     ElevationNoise,
     gaussian_update,
+    mixture_moments,
     norm_way_covariance,
+    quadrature_nodes,
     road_covariance,
     slope_way_covariance,
 )
@@ -27,9 +29,8 @@ _SURVEY_STD, _ANY_HEIGHT, _TEXTURE = 0.03, 1e3, 0.01
 _CUTOFF = 1.0
 # Where no speed is known, the slope could be 5 %.
 _UNKNOWN_SLOPE = 0.05
-_FITTED = ("slope", "trim")
 # By what factor, as a logarithm, the noise of a car differs from the nominal one.
-_NOISE_SPREAD = 0.7
+_NOISE_SPREAD = {"slope": 0.7, "trim": 0.7}
 # The elevation is nearly linear in the constants.
 _LINEARISATIONS = 2
 
@@ -64,7 +65,7 @@ class Posterior:
     constants : Constants
         Of the same names as before.
     noise : ElevationNoise
-        Levels used: those of largest posterior probability.
+        Levels of largest posterior probability; the rest is the mean over all levels by theirs.
     """
 
     series: dict[str, np.ndarray]
@@ -129,13 +130,12 @@ def elevation_posterior(
     for step in range(_LINEARISATIONS):
         system, found = _linearised(drive, constants, mean, method, known, fixed or {}, knots)
         if step == 0:
-            noise = _likely_noise(system, noise, base)
-        state, state_covariance, _ = _update(system, noise, base)
-        state = np.asarray(state)
+            noise, nodes, log_weights = _likely_noise(system, noise, base)
+        state, state_covariance = map(np.asarray, _over_levels(nodes, log_weights, system, ElevationNoise(), base))
         mean = constants.mean + state[: len(names)]
     reading = np.hstack([np.asarray(system.sensitivity), np.eye(knots.size)])
     change = np.asarray(system.height) + reading @ state[: reading.shape[1]] - np.asarray(found["elevation"])[knots]
-    covariance = np.asarray(state_covariance)[: reading.shape[1], : reading.shape[1]]
+    covariance = state_covariance[: reading.shape[1], : reading.shape[1]]
     return Posterior(
         series=_series(found, drive, knots, change, reading @ covariance @ reading.T),
         constants=Constants(names=names, mean=mean, covariance=covariance[: len(names), : len(names)]),
@@ -221,7 +221,6 @@ def _elevation_covariance(system: _System, noise: ElevationNoise, base: str) -> 
     return constants + _elevation_noise(system, noise, base)
 
 
-@partial(jax.jit, static_argnames="base")
 def _update(system: _System, noise: ElevationNoise, base: str) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Constants, error of the elevation at the knots, and height of the first sample, as deviations from the prior."""
     n, k = system.sensitivity.shape[1], system.t.size
@@ -248,25 +247,46 @@ def _update(system: _System, noise: ElevationNoise, base: str) -> tuple[jax.Arra
     return gaussian_update(prior, jnp.concatenate(designs), jnp.concatenate(observed), block_diag(*covariances))
 
 
+def _levels(z: jax.Array, nominal: ElevationNoise) -> ElevationNoise:
+    """Noise whose levels differ from the nominal ones by these numbers of spreads."""
+    factors = {name: jnp.exp(spread * x) for (name, spread), x in zip(_NOISE_SPREAD.items(), z, strict=True)}
+    return replace(nominal, **{name: getattr(nominal, name) * factor for name, factor in factors.items()})
+
+
 @partial(jax.jit, static_argnames="base")
-@partial(jax.value_and_grad, argnums=0)
-def _misfit(logarithms: jax.Array, system: _System, nominal: ElevationNoise, base: str) -> jax.Array:
-    levels = {name: getattr(nominal, name) * jnp.exp(x) for name, x in zip(_FITTED, logarithms, strict=True)}
-    log_likelihood = _update(system, replace(nominal, **levels), base)[2]
-    return 0.5 * jnp.sum((logarithms / _NOISE_SPREAD) ** 2) - log_likelihood
+@jax.value_and_grad
+def _misfit(z: jax.Array, system: _System, nominal: ElevationNoise, base: str) -> jax.Array:
+    return 0.5 * jnp.sum(z**2) - _update(system, _levels(z, nominal), base)[2]
 
 
-def _likely_noise(system: _System, nominal: ElevationNoise, base: str) -> ElevationNoise:
-    """Levels of largest posterior probability."""
+def _likely_noise(system: _System, nominal: ElevationNoise, base: str) -> tuple[ElevationNoise, jax.Array, jax.Array]:
+    """Levels of largest posterior probability, and the nodes of a quadrature over all of them."""
 
-    def objective(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
-        value, gradient = _misfit(jnp.asarray(logarithms), system, nominal, base)
-        return float(value), np.asarray(gradient)
+    def misfit(z: np.ndarray) -> tuple[float, np.ndarray]:
+        value, slope = _misfit(jnp.asarray(z), system, nominal, base)
+        return float(value), np.asarray(slope)
 
-    start = np.zeros(len(_FITTED))
-    found = minimize(objective, start, jac=True, method="L-BFGS-B", options={"maxiter": 15, "ftol": 1e-4})
-    levels = {name: getattr(nominal, name) * float(np.exp(x)) for name, x in zip(_FITTED, found.x, strict=True)}
-    return replace(nominal, **levels)
+    start = np.zeros(len(_NOISE_SPREAD))
+    best = minimize(misfit, start, jac=True, method="L-BFGS-B", options={"maxiter": 15, "ftol": 1e-4}).x
+    # Of slopes a tenth of a spread to either side: that compiles nothing new, and the nodes need no better.
+    steps = 0.1 * np.eye(best.size)
+    curvature = np.stack([misfit(best + step)[1] - misfit(best - step)[1] for step in steps]) / 0.2
+    # The prior's own curvature is 1: farther than that no node needs to be.
+    return _levels(jnp.asarray(best), nominal), *quadrature_nodes(best, (curvature + curvature.T) / 2, 1.0)
+
+
+@partial(jax.jit, static_argnames="base")
+def _over_levels(
+    nodes: jax.Array, log_weights: jax.Array, system: _System, nominal: ElevationNoise, base: str
+) -> tuple[jax.Array, jax.Array]:
+    """Mean and covariance over the levels of the noise, by their posterior probabilities."""
+
+    def of_node(z: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+        state, covariance, log_likelihood = _update(system, _levels(z, nominal), base)
+        return state, covariance, log_likelihood - 0.5 * jnp.sum(z**2)
+
+    states, covariances, log_posterior = jax.lax.map(of_node, nodes)
+    return mixture_moments(states, covariances, log_weights + log_posterior)
 
 
 def _series(

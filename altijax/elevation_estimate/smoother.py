@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.scipy.linalg import cho_factor, cho_solve
 from jax.typing import ArrayLike
 
@@ -161,6 +162,66 @@ def gaussian_update(
     whitened = cho_solve(factor, observed)
     log_likelihood = -0.5 * jnp.dot(observed, whitened) - jnp.sum(jnp.log(jnp.diagonal(factor[0])))
     return cross @ whitened, prior_covariance - cross @ cho_solve(factor, cross.T), log_likelihood
+
+
+def quadrature_nodes(
+    best: ArrayLike, curvature: ArrayLike, least_curvature: float, count: int = 3
+) -> tuple[jax.Array, jax.Array]:
+    """Nodes of an adaptive Gauss-Hermite quadrature, about the maximum of a density and as wide as that is there.
+
+    Parameters
+    ----------
+    best : (unknowns,)
+        Where the density is largest.
+    curvature : (unknowns, unknowns)
+        Minus the second derivatives of its logarithm there.
+    least_curvature : float
+        Taken in directions in which it is less.
+    count : int
+        Nodes in each direction.
+
+    Returns
+    -------
+    nodes : (nodes, unknowns)
+        ``count ** unknowns`` of them.
+    log_weights : (nodes,)
+        An integral over the density is the sum of what is integrated times ``exp(log_weights) * density``, but for a
+        factor common to all.
+    """
+    best = require_shape("best", best, (None,))
+    curvature = require_shape("curvature", curvature, (best.size, best.size))
+    values, vectors = jnp.linalg.eigh(curvature)
+    node, weight = np.polynomial.hermite_e.hermegauss(count)
+    z, weights = (np.stack(np.meshgrid(*[x] * best.size), -1).reshape(-1, best.size) for x in (node, weight))
+    nodes = best + z @ (vectors / jnp.sqrt(jnp.maximum(values, least_curvature))).T
+    return nodes, jnp.asarray(np.log(weights).sum(1) + 0.5 * np.square(z).sum(1), best.dtype)
+
+
+def mixture_moments(means: ArrayLike, covariances: ArrayLike, log_weights: ArrayLike) -> tuple[jax.Array, jax.Array]:
+    """Mean and covariance of a mixture.
+
+    Parameters
+    ----------
+    means : (parts, unknowns)
+        Of its parts.
+    covariances : (parts, unknowns, unknowns)
+        Of its parts.
+    log_weights : (parts,)
+        Logarithms of their weights, but for a constant.
+
+    Returns
+    -------
+    mean : (unknowns,)
+        Of all.
+    covariance : (unknowns, unknowns)
+        Of all: that within the parts and that between them.
+    """
+    means = require_shape("means", means, (None, None))
+    weights = jax.nn.softmax(require_shape("log_weights", log_weights, means.shape[:1]))
+    covariances = require_shape("covariances", covariances, (*means.shape, means.shape[1]))
+    mean = weights @ means
+    apart = jnp.sqrt(weights)[:, None] * (means - mean)
+    return mean, jnp.tensordot(weights, covariances, 1) + apart.T @ apart
 
 
 def _steps_before(t: jax.Array) -> jax.Array:

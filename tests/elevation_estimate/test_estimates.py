@@ -58,6 +58,19 @@ def test_estimates_do_not_look_at_the_reference_or_at_gnss_heights() -> None:
         pd.testing.assert_frame_equal(estimates.estimate_elevation(none, method=method), with_heights)
 
 
+def test_coverage_is_of_heights_above_the_start_whatever_part_is_scored() -> None:
+    """A metre off from the first second on, with bars of 0.8 m, is within two of them, and its later RMS is none."""
+    truth = np.interp(EXACT.imu.index, EXACT.reference.index, EXACT.reference["alt"])
+    moved = np.clip(EXACT.imu.index.to_numpy(), 0.0, 1.0)
+    estimate = pd.DataFrame(
+        {"elevation": truth - truth[0] + moved, "elevation_std": 0.8 * moved, "way": truth}, index=EXACT.imu.index
+    )
+    for after in (None, 30.0):
+        score = estimates.score_elevation(estimate, EXACT, after=after)
+        assert (score["within_1_std"], score["within_2_std"]) == (0.0, 1.0)
+    assert score["rms"] < 0.01
+
+
 def test_gnss_speed_serves_where_there_is_no_wheel() -> None:
     """Ground speed is less than the way's by the cosine of the slope: 0.2 % at 6 %."""
     without = dataclasses.replace(EXACT, wheel=None)

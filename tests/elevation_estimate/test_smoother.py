@@ -10,7 +10,9 @@ import pytest
 from altijax.elevation_estimate.smoother import (
     ElevationNoise,
     gaussian_update,
+    mixture_moments,
     norm_way_covariance,
+    quadrature_nodes,
     road_covariance,
     slope_way_covariance,
 )
@@ -83,6 +85,49 @@ def test_an_update_is_the_weighted_mean() -> None:
     joint = np.array([[5.0, 4.0], [4.0, 8.0]])
     expected = -0.5 * np.array([3, 5]) @ np.linalg.solve(joint, [3, 5]) - 0.5 * np.log(np.linalg.det(joint))
     assert log_likelihood == pytest.approx(expected)
+
+
+def test_an_update_of_unknown_noise_is_the_integral_over_its_levels() -> None:
+    """Five readings of a value, their noise known to a factor e^0.7: against a sum over a fine grid of levels."""
+    observed = jnp.array([0.3, 2.4, 1.1, -0.9, 1.9])
+
+    def update(z: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+        noise = jnp.exp(1.4 * z[0]) * jnp.eye(5)
+        mean, covariance, log_likelihood = gaussian_update(jnp.eye(1), jnp.ones((5, 1)), observed, noise)
+        return mean, covariance, log_likelihood - 0.5 * z[0] ** 2
+
+    def over(nodes: jax.Array, log_weights: jax.Array | float) -> tuple[jax.Array, jax.Array]:
+        means, covariances, log_density = jax.vmap(update)(nodes)
+        return mixture_moments(means, covariances, log_weights + log_density)
+
+    fine = jnp.linspace(-6, 6, 4001)[:, None]
+    best = fine[jnp.argmax(jax.vmap(update)(fine)[2])]
+    curvature = -jax.hessian(lambda z: update(z)[2])(best)
+    mean, variance = over(fine, jnp.zeros(4001))
+    found, found_variance = over(*quadrature_nodes(best, curvature, 1.0))
+    np.testing.assert_allclose(found, mean, rtol=0.005)
+    np.testing.assert_allclose(found_variance, variance, rtol=0.02)
+    # at the likeliest level alone the bar is another
+    assert abs(update(best)[1][0, 0] / variance[0, 0] - 1) > 0.05
+
+
+def test_quadrature_is_exact_for_polynomials_under_a_normal_density() -> None:
+    curvature = jnp.array([[3.0, 1.0], [1.0, 2.0]])
+    nodes, log_weights = quadrature_nodes(jnp.array([1.0, -2.0]), curvature, 0.1)
+    away = nodes - jnp.array([1.0, -2.0])
+    weights = jax.nn.softmax(log_weights - 0.5 * jnp.einsum("ni,ij,nj->n", away, curvature, away))
+    covariance = jnp.linalg.inv(curvature)
+    np.testing.assert_allclose(weights @ away, 0, atol=1e-12)
+    np.testing.assert_allclose(jnp.einsum("n,ni,nj->ij", weights, away, away), covariance, rtol=1e-9)
+
+
+def test_a_mixture_is_as_wide_as_its_parts_and_as_they_are_apart() -> None:
+    mean, covariance = mixture_moments(
+        jnp.array([[1.0, 0.0], [4.0, 2.0]]), jnp.stack([jnp.eye(2), 2 * jnp.eye(2)]), jnp.log(jnp.array([2.0, 1.0]))
+    )
+    np.testing.assert_allclose(mean, [2.0, 2 / 3])
+    between = 2 / 9 * np.outer([3, 2], [3, 2])
+    np.testing.assert_allclose(covariance, 4 / 3 * np.eye(2) + between)
 
 
 def test_shapes_that_do_not_fit_are_named() -> None:
