@@ -50,7 +50,8 @@ def estimate_elevation(
         Indexed as ``recording.imu``: elevation (m, zero at the first sample), elevation_std (m), way (m), horizontal
         (m), vertical_speed (m/s), and valid, False where the IMU or the speed has a gap or had not begun. Without a
         calibration of the constants the standard deviation is that of an uncalibrated consumer's instrument; where
-        heights are known or the method is "fused", the level of the noise is the likeliest for this drive.
+        heights are known or the method is "fused", it is over the levels of the noise as likely as this drive makes
+        them. It is too small for a car whose errors last longer than the model's 5 s.
 
     Raises
     ------

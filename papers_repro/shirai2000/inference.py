@@ -160,10 +160,15 @@ def gyro_ways(course: Course, drift: jax.Array, noise: jax.Array, draws: jax.Arr
     t = dt * (jnp.arange(STEPS) + 0.5)
     pace = course.way / (course.duration - RAMP)
     speed = pace * jnp.clip(jnp.minimum(t, course.duration - t) / RAMP, 0, 1)
-    walk = noise / 2**0.5 * jnp.sqrt(dt) * jnp.cumsum(draws[:, 1:], 1)
+    walk = noise / 2**0.5 * jnp.sqrt(dt) * _to_middle(draws[:, 1:])
     tilt = drift * draws[:, :1] * t[:, None] + walk
-    error = GRAVITY * dt * jnp.cumsum(tilt, 1)
+    error = GRAVITY * dt * _to_middle(tilt)
     return dt * jnp.sum(jnp.hypot(speed + error[..., 0], error[..., 1]), -1)
+
+
+def _to_middle(steps: jax.Array) -> jax.Array:
+    """Sums along the second axis up to the middle of each step, where the speed is taken too."""
+    return jnp.cumsum(steps, 1) - steps / 2
 
 
 def infer(experiments: Experiments, sites: tuple[Site, Site], key: jax.Array) -> tuple[Posterior, list[Posterior]]:
