@@ -15,6 +15,8 @@ straight lines between the epochs is. Rows are recordings and what is done:
     umn              as recorded; "no delay": delay=0, as its reference has it
     withheld         every other epoch withheld and predicted
     others           no reference of attitude: that there is an estimate, and what it says of itself
+
+Below a row that was set a limit stands each figure with its limit, and whether it was met.
 """
 
 import sys
@@ -34,6 +36,29 @@ from altijax.recordings import Recording
 
 ANGLES, VELOCITY = ["roll", "pitch", "heading"], ["v_e", "v_n", "v_u"]
 TURN = Rotation.from_euler("ZYX", [40, -10, -15], degrees=True)
+
+# What was asked for beforehand; errors at most, "times linear" at least.
+LIMITS = {
+    "comma 1 Hz, batch": {
+        "roll": 0.45,
+        "pitch": 0.40,
+        "heading": 1.3,
+        "roll by its std": 2,
+        "pitch by its std": 2,
+        "heading by its std": 2,
+        "times linear": 3,
+    },
+    "comma 1 Hz, window": {"times linear": 3},
+    "comma 1 Hz turned, window": {"heading": 2.5},
+    "comma u-blox, batch": {"times linear": 1.7},
+    "umn, batch": {"roll": 0.9, "pitch": 0.7, "heading": 2.5, "velocity": 0.40},
+    "umn, batch, no gyro": {"roll": 4.5, "pitch": 2.6},
+    "umn withheld, batch": {"velocity": 0.40},
+    "umn withheld, batch, no gyro": {"velocity": 1.0},
+}
+
+# A line of text, and figures by the names of limits.
+Measured = tuple[str, dict[str, float]]
 
 
 def comma() -> Recording:
@@ -74,9 +99,9 @@ def between_epochs(estimate: pd.DataFrame, recording: Recording) -> pd.DataFrame
     return estimate.assign(valid=estimate["valid"] & (t >= epochs[0]) & (t <= epochs[-1]))
 
 
-def against_reference(recording: Recording, **options: object) -> str:
+def against_reference(recording: Recording, **options: object) -> Measured:
     estimate = estimate_motion(recording, **options)
-    parts = [of_itself(estimate)]
+    parts, figures = [of_itself(estimate)], {}
     if recording.reference is not None:
         score = score_motion(estimate, recording)
         angles = [name for name in ANGLES if name in score.index]
@@ -84,6 +109,7 @@ def against_reference(recording: Recording, **options: object) -> str:
             rms, stated = np.degrees(score.loc[angles, "rms"]), np.degrees(score.loc[angles, "stated_std"])
             within = 100 * score.loc[angles, "within_2_std"]
             parts.insert(0, f"deg {slashed(rms)} (std {slashed(stated)}; within 2: {slashed(within, 0)} %)")
+            figures |= rms.to_dict() | {f"{name} by its std": rms[name] / stated[name] for name in angles}
         known = [name for name in VELOCITY if name in score.index and recording.gnss[name].notna().all()]
         inner = between_epochs(estimate, recording)
         score = score_motion(inner, recording)
@@ -92,16 +118,25 @@ def against_reference(recording: Recording, **options: object) -> str:
         stated = float(np.sqrt((score.loc[known, "stated_std"] ** 2).sum()))
         parts.insert(1, f"{len(known)}-D {both[0]:.4f} m/s (std {stated:.4f}; linear {both[1] / both[0]:.2f} times)")
         parts.insert(2, f"e/n/u {slashed(score.loc[known, 'rms'], 4)}")
-    return "; ".join(parts)
+        figures |= {"velocity": both[0], "times linear": both[1] / both[0]}
+    return "; ".join(parts), figures
 
 
-def withheld(recording: Recording, **options: object) -> str:
+def withheld(recording: Recording, **options: object) -> Measured:
     errors = withheld_gnss_errors(recording, **options)
     rms, stated = (
         np.sqrt(np.nanmean((errors[names].to_numpy() ** 2).sum(-1)))
         for names in (VELOCITY, [f"{name}_std" for name in VELOCITY])
     )
-    return f"3-D {rms:.4f} m/s (std of the estimate alone {stated:.4f}); delay {errors.attrs['delay']:.3f} s"
+    text = f"3-D {rms:.4f} m/s (std of the estimate alone {stated:.4f}); delay {errors.attrs['delay']:.3f} s"
+    return text, {"velocity": rms}
+
+
+def verdict(name: str, figure: float, limit: float) -> str:
+    """A figure with its limit and whether it was met."""
+    least = name == "times linear"
+    met = figure >= limit if least else figure <= limit
+    return f"{name} {figure:.4f} ({'at least' if least else 'at most'} {limit:g}: {'met' if met else 'MISSED'})"
 
 
 def of_itself(estimate: pd.DataFrame) -> str:
@@ -120,8 +155,8 @@ def slashed(values: pd.Series, digits: int = 2) -> str:
     return "/".join(f"{value:.{digits}f}" for value in values)
 
 
-def rows() -> Iterator[tuple[str, Callable[[], str]]]:
-    def row(name: str, measure: Callable[..., str], load: Callable[[], Recording], **options: object) -> tuple:
+def rows() -> Iterator[tuple[str, Callable[[], Measured]]]:
+    def row(name: str, measure: Callable[..., Measured], load: Callable[[], Recording], **options: object) -> tuple:
         return name, lambda: measure(load(), **options)
 
     def umn() -> Recording:
@@ -152,8 +187,11 @@ def main() -> None:
     for name, measure in rows():
         if not chosen or any(part in name for part in chosen):
             start = time.perf_counter()
-            line = measure()
+            line, figures = measure()
             print(f"{name:30} {line}  [{time.perf_counter() - start:.1f} s]", flush=True)
+            limits = [verdict(of, figures[of], limit) for of, limit in LIMITS.get(name, {}).items()]
+            if limits:
+                print(f"{'':30} {'; '.join(limits)}", flush=True)
 
 
 if __name__ == "__main__":
