@@ -14,6 +14,8 @@ straight lines between the epochs is. Rows are recordings and what is done:
     comma u-blox     the receiver's own velocities, one in ten, without climb
     umn              as recorded; "no delay": delay=0, as its reference has it
     withheld         every other epoch withheld and predicted
+    wheels           speeds against the car's wheel speeds, which neither estimates nor GNSS have seen: what a
+                     straight line (scale, delay) leaves of 0.2 s means within 5 s, beside the same of the reference
     others           no reference of attitude: that there is an estimate, and what it says of itself
 
 Below a row that was set a limit stands each figure with its limit, and whether it was met.
@@ -139,6 +141,28 @@ def verdict(name: str, figure: float, limit: float) -> str:
     return f"{name} {figure:.4f} ({'at least' if least else 'at most'} {limit:g}: {'met' if met else 'MISSED'})"
 
 
+def against_wheels(recording: Recording) -> Measured:
+    found = {"reference": recording.reference}
+    found |= {method: estimate_motion(recording, method=method) for method in ("batch", "window")}
+    t = np.arange(2.5, recording.imu.index[-1] - 2.5, 0.1)
+    wheels = means(recording.wheel["speed"], t)
+    parts = []
+    for name, motion in found.items():
+        speed = means(np.sqrt((motion[VELOCITY] ** 2).sum(axis=1)), t)
+        model = np.stack([wheels, np.ones_like(t), np.gradient(speed, t)], -1)
+        rest = pd.Series(speed - model @ np.linalg.lstsq(model, speed, rcond=None)[0])
+        rest -= rest.rolling(51, center=True, min_periods=1).mean()
+        parts.append(f"{name} {rest.std():.4f}")
+    return f"speed, m/s: {', '.join(parts)}", {}
+
+
+def means(series: pd.Series, t: np.ndarray) -> np.ndarray:
+    """Means over 0.2 s about each time."""
+    knots, values = series.index.to_numpy(float), series.to_numpy(float)
+    sums = np.append(0.0, np.cumsum(0.5 * (values[1:] + values[:-1]) * np.diff(knots)))
+    return (np.interp(t + 0.1, knots, sums) - np.interp(t - 0.1, knots, sums)) / 0.2
+
+
 def of_itself(estimate: pd.DataFrame) -> str:
     said = estimate.attrs
     values = estimate.to_numpy(float)
@@ -168,6 +192,7 @@ def rows() -> Iterator[tuple[str, Callable[[], Measured]]]:
     yield row("comma 1 Hz turned, batch", against_reference, lambda: turned(comma()))
     yield row("comma 1 Hz turned, window", against_reference, lambda: turned(comma()), method="window")
     yield row("comma 1 Hz, epoch", against_reference, comma, method="epoch")
+    yield row("comma 1 Hz, wheels", against_wheels, comma)
     yield row("comma u-blox, batch", against_reference, comma_ublox)
     yield row("umn, batch", against_reference, umn)
     yield row("umn no delay, batch", against_reference, umn, delay=0.0)
