@@ -1,6 +1,7 @@
 """What all tests share: double precision, and the folder of real recordings."""
 
 import os
+import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -8,6 +9,18 @@ import jax
 import pytest
 
 jax.config.update("jax_enable_x64", True)
+
+
+# What one module or notebook compiles, the next loads. Each worker has a folder of its own, as processes that write to
+# the same one spoil it; a worker waits for the kernels of its notebooks, so these may have it too.
+_COMPILED = tempfile.TemporaryDirectory(prefix="altijax-compiled-")
+for _name, _value in {
+    "jax_compilation_cache_dir": _COMPILED.name,
+    "jax_persistent_cache_min_compile_time_secs": 0.0,
+    "jax_persistent_cache_min_entry_size_bytes": -1,
+}.items():
+    jax.config.update(_name, _value)
+    os.environ[_name.upper()] = str(_value)
 
 
 @pytest.fixture(scope="session")
