@@ -54,6 +54,8 @@ LIMITS = {"2+2": (1.1, 2.4, 2.5), "2+3": (0.8, 0.8, 0.9), "6": (0.5, 0.7, 0.7)}
 """RMS after outages of these durations on rtk-drive, in m/s, by sensors of the filter."""
 HIGHWAY, EXACT, GROWTH, RATIO, ONE_STD = 2.0, 0.05, 0.05, 1.1, (0.60, 0.75)
 BINS = {"<1": (0.0, 1.0), "1-3": (1.0, 3.0), ">3": (3.0, np.inf)}
+SHAKING = np.array([0.02, 0.06, 0.006])
+"""Vibration of a made-up car's rates at 10 m/s, in rad/s, between those of the two real cars."""
 CARS, RATE, LENGTH, HARDEST = 8, 50.0, 200.0, 4.0
 
 
@@ -136,9 +138,9 @@ def made_up_drive(seed: int) -> Recording:
     # a rougher road shakes more, a rate that shakes shows a bias
     speed = np.asarray(truth.speed)
     rough = np.exp(0.4 * _lasting(rng, speed.size, 25.0)) * (0.1 + (speed / 10) ** 0.7)
-    shaking = 0.06 * rough
-    w += shaking[:, None] * _vibration(rng, w.shape)
-    w[:, 1] += 0.05 * rng.normal() * shaking**2
+    shaking = SHAKING * rough[:, None]
+    w += shaking * _vibration(rng, w.shape)
+    w[:, 1] += 0.05 * rng.normal() * shaking[:, 1] ** 2
     f += 0.5 * rough[:, None] * _vibration(rng, f.shape)
     index = pd.Index(np.asarray(truth.t), name="t")
     imu = pd.DataFrame(np.hstack([f, w]), index=index, columns=["ax", "ay", "az", "gx", "gy", "gz"])
