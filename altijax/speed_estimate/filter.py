@@ -31,6 +31,9 @@ _LARGEST |= {"travel_yaw": 1.0, "travel_pitch": 1.0}
 _UNLIKELY = 30.0
 # Steps over which the rates are taken to be steady where their noise must not count.
 _SLOW = 11
+# Steps that a bump shakes a car for: the mean over as many is one measurement, else one bump counts as several. Seen on
+# two cars and a motorbike: the logarithm's correlation is 0.4 to 0.7 after one step, at most 0.23 after five.
+_BUMP = 5
 
 
 @jax.tree_util.register_dataclass
@@ -94,7 +97,8 @@ def filter_speed(
     wander about a mean. With six sensors the IMU's velocity is carried along its own axes, and the point that does not
     slip has neither lateral nor vertical speed. Of the aid only the speed is used. A measurement beyond 3 standard
     deviations counts as one of a larger error. Where the vehicle stands, its speed and rates are zero. Where the aid
-    has shown that the vehicle shakes the more the faster it is, the vibration is a measurement of the speed.
+    has shown that the vehicle shakes the more the faster it is, the vibration, in means of five steps, is a measurement
+    of the speed.
 
     Parameters
     ----------
@@ -165,6 +169,9 @@ def filter_speed(
         w_slow=_moving_mean(w_b, _SLOW),
         w_dot=(after - before) / (2 * dt),
         vibration=given["vibration"],
+        shaking=_moving_mean(given["vibration"][:, None], _BUMP)[:, 0],
+        shaking_told=jnp.arange(time) % _BUMP == _BUMP // 2,
+        shaking_aided=_moving_mean(has_aid.astype(dtype)[:, None], _BUMP)[:, 0] > 0,
         still=given["still"] != 0,
         aid_speed=jnp.where(has_aid, given["aid_speed"], 0),
         aid_acceleration=jnp.where(has_aid, given["aid_acceleration"], 0),

@@ -86,7 +86,7 @@ class SpeedNoise:
     roughness : ()
         Standard deviation of the logarithm of the vibration that the road makes, about its mean for a speed.
     roughness_scatter : ()
-        The same in one step, without memory.
+        The same in one mean of five steps, without memory.
     aid : () m/s
         Error of the aid.
     accelerometer_walk : () m/s^2/sqrt(s)
@@ -114,7 +114,11 @@ class SpeedNoise:
 
 
 class Step(NamedTuple):
-    """Readings of one step, those of `filter_speed`; w_end at its end, w_slow their running mean, w_dot their rate."""
+    """Readings of one step, those of `filter_speed`; w_end at its end, w_slow their running mean, w_dot their rate.
+
+    `shaking` is the mean vibration of some steps; the middle one of them has `shaking_told`, and `shaking_aided` if any
+    of them has an aid.
+    """
 
     f_b: jax.Array
     w_b: jax.Array
@@ -122,6 +126,9 @@ class Step(NamedTuple):
     w_slow: jax.Array
     w_dot: jax.Array
     vibration: jax.Array
+    shaking: jax.Array
+    shaking_told: jax.Array
+    shaking_aided: jax.Array
     still: jax.Array
     aid_speed: jax.Array
     aid_acceleration: jax.Array
@@ -320,12 +327,12 @@ def measurements(
         (step.w_b[axis], jnp.full_like(zero, _STILL_RATE), step.still)
         for axis in ((1, 2) if sensors == "2+2" else (1, 2, 0))
     ]
-    shaking = jnp.log(jnp.maximum(step.vibration, _LEAST_VIBRATION) / _USUAL_VIBRATION)
+    shaking = jnp.log(jnp.maximum(step.shaking, _LEAST_VIBRATION) / _USUAL_VIBRATION)
     return [
         *constraints,
         (step.aid_speed, noise.aid, step.aided),
         (zero, jnp.full_like(zero, _STILL_SPEED), step.still),
-        (shaking, noise.roughness_scatter, step.aided | shaken),
+        (shaking, noise.roughness_scatter, step.shaking_told & moving & (step.shaking_aided | shaken)),
         *at_rest,
     ]
 

@@ -84,6 +84,29 @@ def test_turning_tells_the_speed_and_going_straight_does_not() -> None:
     assert jnp.max(curves.speed_std[200:]) < 1.2 and jnp.min(straight.speed_std[200:]) > 50
 
 
+@pytest.mark.parametrize("phase", [0, 3])
+def test_what_shakes_a_car_tells_its_speed_where_it_does_not_turn(phase: int) -> None:
+    """An aid once a second teaches it whichever steps have it, and bumps of a second count once."""
+    rng = np.random.default_rng(6)
+    speed = 10 + 6 * np.sin(0.25 * DT * np.arange(1, N + 1))
+    bumps = np.repeat(rng.normal(size=N // 5 + 1), 5)[2 : N + 2]
+    acceleration = np.gradient(speed, DT)
+    made = drive() | {
+        "f_b": np.stack([acceleration + 0.1 * (np.arange(N) >= 300), 0 * speed, np.full(N, GRAVITY)], -1),
+        "w_b": np.zeros((N, 3)),
+        "aid_speed": speed,
+        "aid_acceleration": acceleration,
+        "aided": (np.arange(N) < 300) & (np.arange(N) % 5 == phase),
+    }
+    shaking = 0.004 * (1 + (speed / 3) ** 2) ** 0.75 * np.exp(0.5 * bumps)
+    noise = SpeedNoise(aid=0.02, roughness=0.3, roughness_scatter=0.5)
+    shaken, smooth = (run(**made | {"vibration": x}, noise=noise) for x in (shaking, np.zeros(N)))
+    assert shaken.speed_std[-1] < 0.4 * smooth.speed_std[-1]
+    assert abs(shaken.speed[-1] - speed[-1]) < 2 * shaken.speed_std[-1]
+    gain, std = state(shaken, "2+2", "vibration_gain")
+    assert abs(gain - 1.5) < 3 * std < 1.5
+
+
 def test_a_wild_reading_of_the_aid_does_little() -> None:
     made = drive(noise=0.02, seed=4)
     wild = made["aid_speed"].copy()
