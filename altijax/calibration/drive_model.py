@@ -85,7 +85,9 @@ class Stretch:
     t_wheel : (samples,) s
         Stamps of the wheels.
     wheel : (samples,) m/s
-        Their speeds.
+        Their speeds, each the mean over some time.
+    wheel_spread : (samples,) s
+        Standard deviation of the times that it is the mean of.
     wheel_std : (samples, 3) m/s
         Standard deviation of the wheel speed and of standing still sideways and upwards.
     """
@@ -100,6 +102,7 @@ class Stretch:
     gnss_std: jax.Array
     t_wheel: jax.Array
     wheel: jax.Array
+    wheel_spread: jax.Array
     wheel_std: jax.Array
 
 
@@ -143,8 +146,11 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
     at_epochs = _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:]
     gnss = (stretch.v_gnss - at_epochs) / stretch.gnss_std[:, jnp.asarray([0, 0, 1])]
     # Standing still sideways and upwards holds at any time, whatever the wheels' stamps.
-    rolled, still = _at(stretch.t_wheel - p["wheel_delay"], v_wheels[:, :1]), _at(stretch.t_wheel, v_wheels[:, 1:])
-    at_samples = jnp.concatenate([rolled, still], -1)
+    forward = v_wheels[:, 0]
+    bend = jnp.pad(jnp.diff(forward, 2), 1) / STEP**2
+    rolled, bent = _at(stretch.t_wheel - p["wheel_delay"], jnp.stack([forward, bend], -1)).T
+    still = _at(stretch.t_wheel, v_wheels[:, 1:])
+    at_samples = jnp.concatenate([(rolled + stretch.wheel_spread**2 / 2 * bent)[:, None], still], -1)
     shown = jnp.stack([p["wheel_scale"] * stretch.wheel, 0 * stretch.wheel, 0 * stretch.wheel], -1)
     wheel = (shown - at_samples) / stretch.wheel_std
     return jnp.concatenate([gnss.T.reshape(-1), wheel.T.reshape(-1)])

@@ -34,7 +34,7 @@ over, as vibration adds to it; and the error of the receiver's velocity that las
 
 # First guesses of the observations' noise, m/s, in the order of GROUPS; the fit replaces them. No less than the last.
 _FIRST_STD, _LEAST_STD = (0.1, 0.2, 0.05, 0.1, 0.1), 0.005
-# Bins of the wheel speeds: their mean is the speed in the middle to (2 pi f bin)^2 / 24, 4e-5 at 0.05 Hz.
+# Margin of a stretch and bin of the wheel speeds, s.
 _MARGIN, _BIN = 0.5, 0.1
 _TURN_STD, _VELOCITY_STD = 0.5, 5.0
 
@@ -226,7 +226,8 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     f_mean, w_mean = (_means(t, x, edges) for x in (f, w))
     bins = np.unique(np.floor(t_wheel / _BIN), return_inverse=True)[1]
     count = np.bincount(bins)
-    t_wheel, wheel = (np.bincount(bins, x) / count for x in (t_wheel, wheel))
+    t_each, (t_wheel, wheel) = t_wheel, (np.bincount(bins, x) / count for x in (t_wheel, wheel))
+    spread = np.sqrt(np.bincount(bins, (t_each - t_wheel[bins]) ** 2) / count)
     heading = _yaw(t, w, t_gnss, v_gnss)
     pieces = []
     used_to = -np.inf
@@ -252,6 +253,7 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
                 gnss_std=jnp.asarray(np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf)),
                 t_wheel=t_wheel[samples] - start,
                 wheel=np.nan_to_num(wheel[samples]),
+                wheel_spread=spread[samples],
                 wheel_std=jnp.asarray(np.stack([rolled, *still], -1)),
             )
         )
@@ -344,7 +346,7 @@ def _stacked(pieces: Iterable[Stretch]) -> Stretch:
     pieces = [p if np.ndim(p.f) == 3 else jax.tree.map(lambda leaf: np.asarray(leaf)[None], p) for p in pieces]
     epochs, samples = (max(getattr(p, name).shape[1] for p in pieces) for name in ("t_gnss", "t_wheel"))
     room = {"t_gnss": epochs, "v_gnss": epochs, "gnss_std": epochs, "t_wheel": samples, "wheel": samples}
-    room["wheel_std"] = samples
+    room |= {"wheel_spread": samples, "wheel_std": samples}
 
     def filled(name: str, values: np.ndarray) -> np.ndarray:
         if name not in room:

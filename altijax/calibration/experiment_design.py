@@ -95,6 +95,7 @@ def drive_information(
         gnss_std=jnp.broadcast_to(levels[:2], (*v_gnss.shape[:2], 2)),
         t_wheel=times(wheel),
         wheel=speed,
+        wheel_spread=jnp.zeros_like(speed),
         wheel_std=jnp.broadcast_to(levels[2:], (*speed.shape, 3)),
     )
     states = own_states(_STEPS)

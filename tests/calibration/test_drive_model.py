@@ -74,6 +74,7 @@ def stretch_and_own() -> tuple[Stretch, jax.Array]:
         gnss_std=jnp.ones((t_gnss.size, 2)),
         t_wheel=t_wheel,
         wheel=drive["wheel"][samples],
+        wheel_spread=jnp.zeros(t_wheel.size),
         wheel_std=jnp.ones((t_wheel.size, 3)),
     )
     return stretch, jnp.zeros(own_states(STEPS)).at[3:6].set(velocity)
@@ -90,6 +91,20 @@ def test_ideal_data_leave_no_residual() -> None:
     jacobian = jax.jit(jax.jacfwd(drive_residuals))(jnp.asarray(TRUTH), own, stretch)
     unit = np.array([row[1] for row in DRIVE_PARAMETERS.values()])
     assert np.all(np.abs(jacobian * unit)[kept].max(0) > 0.03)
+
+
+def test_a_mean_of_speeds_is_not_the_speed_in_its_middle() -> None:
+    """Where the speed bends: a model of the middle alone reads as a scale of the accelerometers."""
+    stretch, own = stretch_and_own()
+    _, drive = recorded()
+    around = np.arange(-5, 6)
+    means = drive["wheel"][100 + 10 * np.arange(stretch.t_wheel.size)[:, None] + around].mean(1)
+    spread = float(jnp.std(drive["t_wheel"][:11]))
+    averaged = replace(stretch, wheel=means, wheel_spread=jnp.full(means.size, spread))
+    inside = np.flatnonzero((stretch.t_wheel > 0.5) & (stretch.t_wheel < 9.5)) + 3 * stretch.t_gnss.size
+    moved = (solve(jnp.asarray(TRUTH), own, averaged) - solve(jnp.asarray(TRUTH), own, stretch))[inside]
+    assert np.abs(means - stretch.wheel)[inside - 3 * stretch.t_gnss.size].max() > 1e-4
+    assert np.abs(moved).max() < 1e-5
 
 
 def test_a_drift_is_an_even_change_of_attitude_or_velocity_in_its_interval() -> None:
