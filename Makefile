@@ -4,10 +4,14 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/ready
 
-.PHONY: reproduce test lint lab notebooks constraints clean
+PAPERS := $(patsubst papers_repro/%/reproduce.py,reproduce-%,$(wildcard papers_repro/*/reproduce.py))
 
-reproduce: $(READY)  ## every paper's table beside ours, then real drives where ALTIJAX_DATA_DIR holds them
-	$(BIN)/python -m papers_repro
+.PHONY: reproduce $(PAPERS) test lint lab notebooks constraints clean
+
+reproduce: $(PAPERS)  ## every paper's table beside ours, and real drives where ALTIJAX_DATA_DIR holds them
+
+$(PAPERS): reproduce-%: $(READY)
+	$(BIN)/python -m papers_repro $*
 
 test: $(READY)  ## all tests
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
