@@ -40,6 +40,7 @@ from altijax.constants import STANDARD_GRAVITY
 from altijax.datasets import load_dataset
 from altijax.doppler import DopplerReceiver
 from altijax.instruments import MEMS_ACCELEROMETER, MEMS_GYRO
+from altijax.metrics import coverage, rms
 from altijax.motions import Readings, ideal_readings, road_pose
 from altijax.recordings import Recording
 from altijax.roads import Road, SpeedProfile, winding_road
@@ -48,6 +49,7 @@ from altijax.speed_estimate.estimates import estimate_speed
 from altijax.speed_estimate.outages import outage_errors
 from altijax.speed_estimate.steps import speed_of
 from papers_repro.us20060293826.stability import curvy_drive, error_growth
+from tests.simulated_drives import lasting
 
 DURATIONS = (10.0, 30.0, 60.0)
 LIMITS = {"2+2": (1.1, 2.4, 2.5), "2+3": (0.8, 0.8, 0.9), "6": (0.5, 0.7, 0.7)}
@@ -65,11 +67,11 @@ def beside(value: float, limit: float, digits: int = 2) -> str:
 
 def exact() -> str:
     growth = jax.jit(error_growth)(curvy_drive())
-    rms = [float(jnp.sqrt(jnp.mean(error**2))) for error in (growth.second_order, growth.literal)]
+    second_order, literal = rms(growth.second_order), rms(growth.literal)
     off = float(jnp.max(jnp.abs(growth.simulated / growth.linearised - 1)))
     return (
-        f"{float(growth.turning[-1]):.1f} rad in a minute: RMS {beside(rms[0], EXACT, 4)} m/s, literal stepping "
-        f"{rms[1]:.1f}; an error grew {float(growth.simulated[-1]):.0f} times, off the linearised equation by "
+        f"{float(growth.turning[-1]):.1f} rad in a minute: RMS {beside(second_order, EXACT, 4)} m/s, literal stepping "
+        f"{literal:.1f}; an error grew {float(growth.simulated[-1]):.0f} times, off the linearised equation by "
         f"{beside(off, GROWTH, 4)}"
     )
 
@@ -96,29 +98,26 @@ def outages(load: Callable[[], list[Recording]], sensors: str, every: float, lim
     for duration, limit in zip(DURATIONS, limits or (np.inf,) * len(DURATIONS), strict=True):
         after = errors[errors["duration"] == duration]
         of = {name: after[after["method"] == key] for name, key in methods.items()}
-        size, std = of["filter"]["error"].abs(), of["filter"]["std"]
-        one, two = (float((size <= k * std).mean()) for k in (1, 2))
+        error, std = (of["filter"][name].to_numpy() for name in ("error", "std"))
+        one, two = (float(coverage(error, std, k)) for k in (1, 2))
         covers = "" if ONE_STD[0] <= one <= ONE_STD[1] else ", MISSED"
-        text = beside(rms(size), limit) if limits else f"{rms(size):.2f}"
+        mine, conventional, roll = (rms(of[name]["error"].to_numpy()) for name in methods)
+        text = beside(mine, limit) if limits else f"{mine:.2f}"
         lines.append(
-            f"{duration:g} s ({size.size}): {text}, stated {rms(std):.2f}, within {one:.2f} "
-            f"(0.60-0.75{covers}) {two:.2f}; largest {size.max():.1f}; without {rms(of['conventional']['error']):.2f}, "
-            f"with roll {rms(of['roll']['error']):.2f}"
+            f"{duration:g} s ({error.size}): {text}, stated {rms(std):.2f}, within {one:.2f} "
+            f"(0.60-0.75{covers}) {two:.2f}; largest {np.abs(error).max():.1f}; without {conventional:.2f}, "
+            f"with roll {roll:.2f}"
         )
         for label, (low, high) in BINS.items():
             inside = {name: rows[rows["turning"].between(low, high, inclusive="right")] for name, rows in of.items()}
             if inside["filter"].empty:
                 continue
-            mine, *theirs = (rms(inside[name]["error"]) for name in methods)
+            mine, *theirs = (rms(inside[name]["error"].to_numpy()) for name in methods)
             lines.append(
                 f"    {label} rad ({len(inside['filter'])}): {mine:.2f}, over conventional and roll "
                 + " / ".join(beside(mine / other, RATIO) for other in theirs)
             )
     return "".join(f"\n  {line}" for line in lines)
-
-
-def rms(values: pd.Series) -> float:
-    return float(np.sqrt(np.mean(np.square(values))))
 
 
 def made_up_drives() -> list[Recording]:
@@ -137,7 +136,7 @@ def made_up_drive(seed: int) -> Recording:
     f, w = (np.array(recorded[name]) for name in "fw")
     # a rougher road shakes more, a rate that shakes shows a bias
     speed = np.asarray(truth.speed)
-    rough = np.exp(0.4 * _lasting(rng, speed.size, 25.0)) * (0.1 + (speed / 10) ** 0.7)
+    rough = np.exp(0.4 * lasting(rng, speed.size, RATE * 25.0)) * (0.1 + (speed / 10) ** 0.7)
     shaking = SHAKING * rough[:, None]
     w += shaking * _vibration(rng, w.shape)
     w[:, 1] += 0.05 * rng.normal() * shaking[:, 1] ** 2
@@ -234,16 +233,6 @@ def _recorded(truth: Readings, parameters: jax.Array, key: jax.Array) -> dict[st
 def _vibration(rng: np.random.Generator, shape: tuple[int, ...]) -> np.ndarray:
     """Noise of unit variance that leads nowhere: the differences of white noise."""
     return np.diff(rng.normal(size=(shape[0] + 1, *shape[1:])), axis=0) / np.sqrt(2)
-
-
-def _lasting(rng: np.random.Generator, count: int, duration: float) -> np.ndarray:
-    """Stationary Gauss-Markov series of unit variance."""
-    keep = np.exp(-1 / (RATE * duration))
-    series = np.empty(count)
-    series[0] = rng.normal()
-    for i, shock in enumerate(np.sqrt(1 - keep**2) * rng.normal(size=count - 1)):
-        series[i + 1] = keep * series[i] + shock
-    return series
 
 
 def rows() -> Iterator[tuple[str, Callable[[], str]]]:

@@ -65,7 +65,7 @@ def simulated_drive(seed: int, car: str = "presumed") -> Recording:
     noise = ElevationNoise()
     add_error = {"presumed": _presumed_error, "strange": _strange_error}[car]
     f[:, 0] += add_error(rng, f[:, 0], speed, np.asarray(truth.position))
-    f[:, 2] += noise.rectified * _lasting(rng, f.shape[0], noise.rectified_time)
+    f[:, 2] += noise.rectified * lasting(rng, f.shape[0], RATE * noise.rectified_time)
     f[:, 0] -= constants["lever_arm"] * yaw_rate**2
     mounting = np.asarray(euler_to_matrix(jnp.array([0.0, constants["mounting_pitch"], constants["mounting_yaw"]])))
     f = f @ mounting
@@ -88,7 +88,7 @@ def _presumed_error(rng: np.random.Generator, f_x: np.ndarray, speed: np.ndarray
     noise, level = ElevationNoise(), np.exp(0.5 * rng.normal())
     way = np.maximum(speed / RATE, 0.05)
     rough = noise.slope * STANDARD_GRAVITY * rng.normal(size=way.size) / np.sqrt(way)
-    return level * (noise.trim * _lasting(rng, way.size, noise.trim_time) + rough)
+    return level * (noise.trim * lasting(rng, way.size, RATE * noise.trim_time) + rough)
 
 
 def _strange_error(rng: np.random.Generator, f_x: np.ndarray, speed: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -109,9 +109,9 @@ def _strange_error(rng: np.random.Generator, f_x: np.ndarray, speed: np.ndarray,
     return trim + 0.05 * stuck + np.interp(way / 80, np.arange(patches.size), patches)
 
 
-def _lasting(rng: np.random.Generator, count: int, time: float) -> np.ndarray:
-    """Stationary Gauss-Markov series of unit variance."""
-    keep = np.exp(-1 / (RATE * time))
+def lasting(rng: np.random.Generator, count: int, samples: float) -> np.ndarray:
+    """Stationary Gauss-Markov series of unit variance that lasts so many samples."""
+    keep = np.exp(-1 / samples)
     series = np.empty(count)
     series[0] = rng.normal()
     for i, shock in enumerate(np.sqrt(1 - keep**2) * rng.normal(size=count - 1)):
