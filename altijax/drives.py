@@ -111,6 +111,12 @@ def speed_readings(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
+def wheel_pair(recording: Recording) -> tuple[str, str] | None:
+    """Columns of the left and right wheel of one axle, of the rear one if there are two; None without such."""
+    pairs = (("left", "right"), ("rear_left", "rear_right"), ("front_left", "front_right"))
+    return next((pair for pair in pairs if recording.wheel is not None and set(pair) <= set(recording.wheel)), None)
+
+
 def imu_of(recording: Recording) -> pd.DataFrame:
     """The IMU stream, which every method needs.
 
@@ -168,12 +174,10 @@ def gravity_at(recording: Recording) -> float:
 
 def _yaw_rate(recording: Recording, t: np.ndarray) -> jax.Array:
     """Rate of turn on the grid: from the wheels as the paper has it, else from the gyro."""
-    start, wheel = start_of(recording), recording.wheel
-    pairs = (("left", "right"), ("rear_left", "rear_right"), ("front_left", "front_right"))
-    pair = next((list(p) for p in pairs if wheel is not None and set(p) <= set(wheel)), None)
+    start, wheel, pair = start_of(recording), recording.wheel, wheel_pair(recording)
     if wheel is not None and pair is not None and recording.track_width is not None:
         sensor = WheelSensor(track_width=recording.track_width)
-        rate = yaw_rate_from_wheels(sensor, wheel[pair].to_numpy(float).T)
+        rate = yaw_rate_from_wheels(sensor, wheel[list(pair)].to_numpy(float).T)
         return resample(t, wheel.index.to_numpy(float) - start, rate, np.inf)[0]
     imu = imu_of(recording)
     if "gz" in imu:

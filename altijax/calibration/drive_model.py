@@ -6,8 +6,10 @@ corrected by their delays: the reading stamped t was that of ``t - delay`` on th
 those of the IMU by the mounting, ``v_vehicle = C(mounting) v_imu``: the IMU sits nose up by `mounting_pitch` and turned
 to the left by `mounting_yaw`. Its roll changes nothing here. What stands still sideways and upwards is the middle of
 the rear axle, `lever_arm` behind the IMU; the antenna is `antenna_lever_arm` ahead of it. An accelerating body pitches
-up by `weight_transfer` a / g, and driven tyres turn faster than they roll, by `wheel_slip` a. Side slip, the way that
-steered wheels go further in a bend, and lever arms across and up are left out.
+up by `weight_transfer` a / g, and driven tyres turn faster than they roll, by `wheel_slip` a. Where the wheels of an
+axle that is not steered are recorded one by one, the right one goes faster than the left one by the rate of turn times
+`track_width`; a right wheel that is larger than the left one by the fraction `wheel_difference` shows less of it. Side
+slip, the way that steered wheels go further in a bend, and lever arms across and up are left out.
 
 The noise of the IMU within a stretch is part of the model: in each interval its attitude and velocity drift evenly by
 as much as white noise makes in that time, the straight line through Brownian motion. What is left of that between the
@@ -43,11 +45,13 @@ DRIVE_PARAMETERS = {
     "wheel_slip": (0.0, 0.003, "s^2/m"),
     "lever_arm": (0.0, 1.5, "m"),
     "antenna_lever_arm": (0.0, 1.0, "m"),
+    "wheel_difference": (0.0, 0.02, "1"),
+    "track_width": (1.5, 0.1, "m"),
 }
 """Parameters by name, in the order of the fit: nominal value, prior standard deviation (a consumer's instrument fixed
 to a car by hand, assumed; a tyre slips by some 1 % at a third of g), unit."""
 
-GROUPS = ("GNSS horizontal", "GNSS vertical", "wheel", "sideways", "upwards")
+GROUPS = ("GNSS horizontal", "GNSS vertical", "wheel", "sideways", "upwards", "right less left wheel")
 """Kinds of residuals, in the order of the fields `gnss_std` and `wheel_std` of `Stretch`."""
 
 STEP = 0.05
@@ -86,10 +90,12 @@ class Stretch:
         Stamps of the wheels.
     wheel : (samples,) m/s
         Their speeds, each the mean over some time.
+    apart : (samples,) m/s
+        By how much the right wheel of an axle is faster than the left one, means likewise.
     wheel_spread : (samples,) s
-        Standard deviation of the times that it is the mean of.
-    wheel_std : (samples, 3) m/s
-        Standard deviation of the wheel speed and of standing still sideways and upwards.
+        Standard deviation of the times that they are the means of.
+    wheel_std : (samples, 4) m/s
+        Standard deviation of the wheel speed, of standing still sideways and upwards, and of `apart`.
     """
 
     f: jax.Array
@@ -102,6 +108,7 @@ class Stretch:
     gnss_std: jax.Array
     t_wheel: jax.Array
     wheel: jax.Array
+    apart: jax.Array
     wheel_spread: jax.Array
     wheel_std: jax.Array
 
@@ -127,7 +134,7 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
 
     Parameters
     ----------
-    parameters : (17,)
+    parameters : (19,)
         Values in the order of `DRIVE_PARAMETERS`.
     own : (states,)
         Turn of the first guess of the attitude (rad) and velocity at the start (m/s), both in navigation axes; then,
@@ -139,25 +146,28 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
     Returns
     -------
     residuals : (observations,)
-        East, North and up of all epochs, then wheel, sideways and upwards of all samples.
+        East, North and up of all epochs, then wheel, sideways, upwards and right less left wheel of all samples.
     """
     p = dict(zip(DRIVE_PARAMETERS, parameters, strict=True))
     v_antenna, v_wheels = _motion(p, own, stretch)
     at_epochs = _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:]
     gnss = (stretch.v_gnss - at_epochs) / stretch.gnss_std[:, jnp.asarray([0, 0, 1])]
+    turned = v_wheels[:, 0] * -p["wheel_difference"] + p["track_width"] * v_wheels[:, 3]
+    rolled = jnp.stack([v_wheels[:, 0], turned], -1)
+    bend = jnp.pad(jnp.diff(rolled, 2, axis=0), ((1, 1), (0, 0))) / STEP**2
+    rolled, bend = jnp.split(_at(stretch.t_wheel - p["wheel_delay"], jnp.concatenate([rolled, bend], -1)), 2, -1)
+    rolled = rolled + stretch.wheel_spread[:, None] ** 2 / 2 * bend
     # Standing still sideways and upwards holds at any time, whatever the wheels' stamps.
-    forward = v_wheels[:, 0]
-    bend = jnp.pad(jnp.diff(forward, 2), 1) / STEP**2
-    rolled, bent = _at(stretch.t_wheel - p["wheel_delay"], jnp.stack([forward, bend], -1)).T
-    still = _at(stretch.t_wheel, v_wheels[:, 1:])
-    at_samples = jnp.concatenate([(rolled + stretch.wheel_spread**2 / 2 * bent)[:, None], still], -1)
-    shown = jnp.stack([p["wheel_scale"] * stretch.wheel, 0 * stretch.wheel, 0 * stretch.wheel], -1)
+    still = _at(stretch.t_wheel, v_wheels[:, 1:3])
+    at_samples = jnp.concatenate([rolled[:, :1], still, rolled[:, 1:]], -1)
+    none = jnp.zeros_like(stretch.wheel)
+    shown = p["wheel_scale"] * jnp.stack([stretch.wheel, none, none, stretch.apart], -1)
     wheel = (shown - at_samples) / stretch.wheel_std
     return jnp.concatenate([gnss.T.reshape(-1), wheel.T.reshape(-1)])
 
 
 def _motion(p: dict[str, jax.Array], own: jax.Array, stretch: Stretch) -> tuple[jax.Array, jax.Array]:
-    """Velocity (steps + 1, 3) of the antenna in navigation axes, and what wheels and axle show in the road's axes."""
+    """Velocity (steps + 1, 3) of the antenna in navigation axes; speed, left, up and rate of turn (steps + 1, 4)."""
     bias, scale, gyro_bias = (
         jnp.stack([p[f"accelerometer_bias_{axis}"] for axis in "xyz"]),
         p["accelerometer_scale"],
@@ -194,7 +204,7 @@ def _motion(p: dict[str, jax.Array], own: jax.Array, stretch: Stretch) -> tuple[
     cos, sin = jnp.cos(squat), jnp.sin(squat)
     forward, up = forward * cos - up * sin, forward * sin + up * cos
     shown = forward * (1 + p["wheel_slip"] * acceleration)
-    return v_antenna, jnp.stack([shown, left, up], -1)
+    return v_antenna, jnp.stack([shown, left, up, w[:, 2]], -1)
 
 
 def _product(a: jax.Array, b: jax.Array) -> jax.Array:

@@ -19,7 +19,7 @@ from altijax.calibration.drive_model import DRIVE_PARAMETERS, GROUPS, STEP, Stre
 from altijax.calibration.identifiability import Identification, identify_information
 from altijax.calibration.serial_correlation import statistical_inefficiency
 from altijax.calibration.shared_parameters import SharedFit, fit_shared
-from altijax.drives import gravity_at, imu_of, start_of
+from altijax.drives import gravity_at, imu_of, start_of, wheel_pair
 from altijax.recordings import Recording
 from altijax.rotations import euler_to_matrix
 
@@ -33,7 +33,7 @@ NOISE = {"gyro": 2e-4, "accelerometer": 5e-3, "receiver": 0.02}
 over, as vibration adds to it; and the error of the receiver's velocity that lasts as long as a stretch, m/s."""
 
 # First guesses of the observations' noise, m/s, in the order of GROUPS; the fit replaces them. No less than the last.
-_FIRST_STD, _LEAST_STD = (0.1, 0.2, 0.05, 0.1, 0.1), 0.005
+_FIRST_STD, _LEAST_STD = (0.1, 0.2, 0.05, 0.1, 0.1, 0.1), 0.005
 # Margin of a stretch and bin of the wheel speeds, s.
 _MARGIN, _BIN = 0.5, 0.1
 _TURN_STD, _VELOCITY_STD = 0.5, 5.0
@@ -86,7 +86,7 @@ def calibrate_drive(
     ----------
     recordings : Recording or several
         Each with six-axis IMU and GNSS velocities (with climb, as far as there is one) of one car, and its wheel speeds
-        if there are any; else what concerns the wheels stays undetermined.
+        if there are any, best one by one; what concerns wheels that were not recorded stays undetermined.
     parameters : sequence of str, optional
         Names out of `DRIVE_PARAMETERS`; the others stay nominal. All by default.
     until : float, optional
@@ -200,7 +200,8 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     Parameters
     ----------
     recorded : mapping
-        t, f, w (IMU); t_gnss, v_gnss; t_wheel, wheel; of the velocities and speeds NaN where missing.
+        t, f, w (IMU); t_gnss, v_gnss; t_wheel, wheel, apart (right less left wheel); of velocities and speeds NaN
+        where missing.
     gravity : float
         Magnitude of gravity, m/s^2.
     noise : mapping, optional
@@ -216,8 +217,8 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     ValueError
         If the drive is shorter than a stretch.
     """
-    t, f, w, t_gnss, v_gnss, t_wheel, wheel = (
-        np.asarray(recorded[name], float) for name in ("t", "f", "w", "t_gnss", "v_gnss", "t_wheel", "wheel")
+    t, f, w, t_gnss, v_gnss, t_wheel, wheel, apart = (
+        np.asarray(recorded[name], float) for name in ("t", "f", "w", "t_gnss", "v_gnss", "t_wheel", "wheel", "apart")
     )
     steps = round((STRETCH + 2 * _MARGIN) / STEP)
     starts = _starts(t)
@@ -226,7 +227,7 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     f_mean, w_mean = (_means(t, x, edges) for x in (f, w))
     bins = np.unique(np.floor(t_wheel / _BIN), return_inverse=True)[1]
     count = np.bincount(bins)
-    t_each, (t_wheel, wheel) = t_wheel, (np.bincount(bins, x) / count for x in (t_wheel, wheel))
+    t_each, (t_wheel, wheel, apart) = t_wheel, (np.bincount(bins, x) / count for x in (t_wheel, wheel, apart))
     spread = np.sqrt(np.bincount(bins, (t_each - t_wheel[bins]) ** 2) / count)
     heading = _yaw(t, w, t_gnss, v_gnss)
     pieces = []
@@ -235,8 +236,9 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
         epochs = _inside(t_gnss, start, used_to) & np.isfinite(v_gnss[:, :2]).all(1)
         samples = _inside(t_wheel, start, used_to)
         used_to = start + _MARGIN + STRETCH
-        rolled = np.where(np.isfinite(wheel[samples]), _FIRST_STD[2], np.inf)
-        still = np.broadcast_to(np.asarray(_FIRST_STD[3:])[:, None], (2, samples.sum()))
+        wheel_std = np.tile(_FIRST_STD[2:], (samples.sum(), 1))
+        for column, shown in ((0, wheel), (3, apart)):
+            wheel_std[~np.isfinite(shown[samples]), column] = np.inf
         f_first = f_mean[k, : round(2 / STEP)].mean(0)
         euler = [np.arctan2(f_first[1], f_first[2]), np.arctan2(f_first[0], np.hypot(*f_first[1:]))]
         euler.append(np.interp(start, t, heading))
@@ -253,8 +255,9 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
                 gnss_std=jnp.asarray(np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf)),
                 t_wheel=t_wheel[samples] - start,
                 wheel=np.nan_to_num(wheel[samples]),
+                apart=np.nan_to_num(apart[samples]),
                 wheel_spread=spread[samples],
-                wheel_std=jnp.asarray(np.stack([rolled, *still], -1)),
+                wheel_std=jnp.asarray(wheel_std),
             )
         )
     return _stacked(pieces)
@@ -270,10 +273,15 @@ def _of_recording(recording: Recording) -> tuple[Stretch, np.ndarray]:
         )
     t = imu.index.to_numpy(float) - start
     t_wheel = np.arange(t[0], t[-1], _BIN)
-    wheel = np.full(t_wheel.size, np.nan)
+    wheel = apart = np.full(t_wheel.size, np.nan)
     if recording.wheel is not None:
         t_wheel = recording.wheel.index.to_numpy(float) - start
         wheel = recording.wheel["speed"].to_numpy(float)
+        apart = np.full(t_wheel.size, np.nan)
+        pair = wheel_pair(recording)
+        if pair is not None:
+            left, right = recording.wheel[list(pair)].to_numpy(float).T
+            apart = right - left
     recorded = {
         "t": t,
         "f": imu[["ax", "ay", "az"]].to_numpy(float),
@@ -282,6 +290,7 @@ def _of_recording(recording: Recording) -> tuple[Stretch, np.ndarray]:
         "v_gnss": recording.gnss[["v_e", "v_n", "v_u"]].to_numpy(float),
         "t_wheel": t_wheel,
         "wheel": wheel,
+        "apart": apart,
     }
     stretches = drive_stretches(recorded, gravity_at(recording))
     starts = _starts(t)
@@ -316,8 +325,8 @@ def _by_group(residuals: jax.Array, stretches: Stretch) -> list[np.ndarray]:
     r = np.asarray(residuals)
     epochs, samples = stretches.t_gnss.shape[1], stretches.t_wheel.shape[1]
     gnss = r[:, : 3 * epochs].reshape(-1, 3, epochs)
-    wheel = r[:, 3 * epochs :].reshape(-1, 3, samples)
-    return [gnss[:, :2].reshape(-1, epochs), gnss[:, 2], wheel[:, 0], wheel[:, 1], wheel[:, 2]]
+    wheel = r[:, 3 * epochs :].reshape(-1, 4, samples)
+    return [gnss[:, :2].reshape(-1, epochs), gnss[:, 2], *wheel.swapaxes(0, 1)]
 
 
 def _group_factor(r: np.ndarray) -> float:
@@ -346,7 +355,7 @@ def _stacked(pieces: Iterable[Stretch]) -> Stretch:
     pieces = [p if np.ndim(p.f) == 3 else jax.tree.map(lambda leaf: np.asarray(leaf)[None], p) for p in pieces]
     epochs, samples = (max(getattr(p, name).shape[1] for p in pieces) for name in ("t_gnss", "t_wheel"))
     room = {"t_gnss": epochs, "v_gnss": epochs, "gnss_std": epochs, "t_wheel": samples, "wheel": samples}
-    room |= {"wheel_spread": samples, "wheel_std": samples}
+    room |= {"apart": samples, "wheel_spread": samples, "wheel_std": samples}
 
     def filled(name: str, values: np.ndarray) -> np.ndarray:
         if name not in room:

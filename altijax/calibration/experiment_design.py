@@ -38,7 +38,7 @@ _STEPS = 4 * STEPS_OF_INTERVAL
 
 def drive_information(
     manoeuvres: Manoeuvres,
-    noise: Sequence[float] = (0.05, 0.1, 0.02, 0.05, 0.1),
+    noise: Sequence[float] = (0.05, 0.1, 0.02, 0.05, 0.1, 0.03),
     slow_noise: Sequence[float] = (1.4e-4, 3.5e-3, 0.02),
     *,
     minutes: int = 5,
@@ -50,7 +50,7 @@ def drive_information(
     ----------
     manoeuvres : Manoeuvres
         How one leg of a minute is driven; the others are like it.
-    noise : (5,) m/s, optional
+    noise : (6,) m/s, optional
         Standard deviations of the observations, in the order of `GROUPS`.
     slow_noise : (3,) rad/sqrt(s), m/s/sqrt(s), m/s, optional
         Random walk of attitude and velocity that the IMU's noise makes, and the receiver's slow error.
@@ -61,7 +61,7 @@ def drive_information(
 
     Returns
     -------
-    information : (17, 17)
+    information : (19, 19)
         Inverse of the covariance that the data alone would give.
 
     Raises
@@ -69,7 +69,7 @@ def drive_information(
     ValueError
         If the shapes do not fit.
     """
-    levels = require_shape("noise", jnp.asarray(noise), (5,))
+    levels = require_shape("noise", jnp.asarray(noise), (6,))
     walks = require_shape("slow_noise", jnp.asarray(slow_noise), (3,))
     stretches = round(60 / (STEP * _STEPS))
     t = STEP * jnp.arange(stretches * _STEPS, dtype=levels.dtype)
@@ -83,7 +83,7 @@ def drive_information(
         return jnp.broadcast_to(t[:_STEPS:every], (stretches, _STEPS // every))
 
     gnss, wheel = round(1 / (rate * STEP)), 4
-    v_gnss, speed = cut(node.velocity, gnss), cut(node.speed, wheel)
+    v_gnss, speed, turning = cut(node.velocity, gnss), cut(node.speed, wheel), cut(node.w_b[:, 2], wheel)
     data = Stretch(
         f=cut(middle.f_b),
         w=cut(middle.w_b),
@@ -95,8 +95,9 @@ def drive_information(
         gnss_std=jnp.broadcast_to(levels[:2], (*v_gnss.shape[:2], 2)),
         t_wheel=times(wheel),
         wheel=speed,
+        apart=DRIVE_PARAMETERS["track_width"][0] * turning,
         wheel_spread=jnp.zeros_like(speed),
-        wheel_std=jnp.broadcast_to(levels[2:], (*speed.shape, 3)),
+        wheel_std=jnp.broadcast_to(levels[2:], (*speed.shape, 4)),
     )
     states = own_states(_STEPS)
     own = jnp.zeros((stretches, states), levels.dtype).at[:, 3:6].set(v_gnss[:, 0])
@@ -119,9 +120,9 @@ def manoeuvre_gains(manoeuvres: Manoeuvres, *, minutes: int = 5, rate: int = 1) 
 
     Returns
     -------
-    bits : (17,)
+    bits : (19,)
         Information gained on each parameter, log2 of prior over posterior standard deviation.
-    added : (6, 17)
+    added : (6, 19)
         Change of these for each of `CHANGES`, from the gradient.
     """
     prior_std = jnp.asarray([row[1] for row in DRIVE_PARAMETERS.values()])
@@ -142,7 +143,7 @@ def driving_protocol(bits: ArrayLike, added: ArrayLike, wanted: tuple[str, ...] 
 
     Parameters
     ----------
-    bits, added : (17,), (6, 17)
+    bits, added : (19,), (6, 19)
         From `manoeuvre_gains`.
     wanted : tuple of str, optional
         Parameters that matter; the three least known by default.

@@ -116,13 +116,13 @@ def recorded_drive(
     ----------
     readings : Readings
         The motion, at uniform times.
-    parameters : (17,)
+    parameters : (19,)
         True values in the order of `DRIVE_PARAMETERS`; the sensors are otherwise as the records say. The motion is that
         of the middle of the rear axle.
     accelerometer, gyro, receiver
         Records of the sensors, for their noise and rate.
     wheel_noise : () m/s
-        Standard deviation of each wheel reading.
+        Standard deviation of the mean of the axle's two wheels; of their difference it is twice that.
     epochs : int
         Number of epochs of the receiver.
     key : key
@@ -131,7 +131,8 @@ def recorded_drive(
     Returns
     -------
     recorded : dict
-        t, f, w; t_gnss, v_gnss (NaN where an epoch is missing); t_wheel and wheel, at half the rate of the IMU.
+        t, f, w; t_gnss, v_gnss (NaN where an epoch is missing); t_wheel, wheel (mean of the axle) and apart (right
+        less left), at half the rate of the IMU.
     """
     t = readings.t
     p = dict(zip(DRIVE_PARAMETERS, jnp.asarray(parameters, t.dtype), strict=True))
@@ -149,6 +150,7 @@ def recorded_drive(
     f = f + p["lever_arm"] * (jnp.cross(jnp.asarray(jnp.gradient(w, dt, axis=0)), ahead) + jnp.cross(w, per_metre))
     at_antenna = (p["lever_arm"] + p["antenna_lever_arm"]) * per_metre
     velocity = readings.velocity + jnp.einsum("tij,tjk,tk->ti", readings.C_nb, body, at_antenna)
+    turning = w[:, 2]
     f, w = f @ mounting, w @ mounting
     bias, rate_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
     accelerometer = replace(accelerometer, bias=bias, scale=p["accelerometer_scale"])
@@ -157,8 +159,12 @@ def recorded_drive(
     )
     t_wheel = t[2:-2:2]
     slipping = readings.speed * (1 + p["wheel_slip"] * acceleration)
-    speed, _ = resample(t_wheel - p["wheel_delay"], t, slipping, jnp.inf)
-    noise = wheel_noise * jax.random.normal(keys[3], speed.shape, t.dtype)
+    apart = p["track_width"] * turning - p["wheel_difference"] * slipping
+    shown, _ = resample(
+        t_wheel - p["wheel_delay"], t, jnp.stack([slipping, apart], -1) / p["wheel_scale"], jnp.inf, axis=-2
+    )
+    # Two wheels' noises: their mean has half the variance of one, their difference twice.
+    noise = wheel_noise * jax.random.normal(keys[3], shown.shape, t.dtype)
     return {
         "t": t,
         "f": accelerometer_output(accelerometer, f, dt, key=keys[0]),
@@ -172,5 +178,6 @@ def recorded_drive(
         "t_gnss": t_gnss,
         "v_gnss": jnp.where(valid[:, None], v_gnss, jnp.nan),
         "t_wheel": t_wheel,
-        "wheel": speed / p["wheel_scale"] + noise,
+        "wheel": shown[:, 0] + noise[:, 0],
+        "apart": shown[:, 1] + 2 * noise[:, 1],
     }

@@ -11,7 +11,7 @@ from altijax.calibration.records import Calibration
 from altijax.drives import drive_arrays, imu_of, reference_heights, start_of
 from altijax.elevation_estimate.model import ELEVATION_METHODS
 from altijax.elevation_estimate.posterior import elevation_posterior
-from altijax.elevation_estimate.priors import prior_constants, with_corrected_yaw_gyro
+from altijax.elevation_estimate.priors import prior_constants, with_corrected_turns
 from altijax.recordings import Recording
 
 
@@ -62,7 +62,7 @@ def estimate_elevation(
     require_method(method)
     known = None if known_heights is None else _known_heights(known_heights, recording)
     with jax.enable_x64(True):
-        corrected = with_corrected_yaw_gyro(recording, calibration)
+        corrected = with_corrected_turns(recording, calibration)
         drive, grid = drive_arrays(corrected, turns=method != "slope")
         fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
         found = elevation_posterior(

@@ -7,7 +7,7 @@ import pandas as pd
 
 from altijax.calibration.parameters import ACCEPTED
 from altijax.calibration.records import Calibration, correct_imu
-from altijax.drives import Drive, imu_of
+from altijax.drives import Drive, imu_of, wheel_pair
 from altijax.elevation_estimate.model import NOMINAL, elevation, uncertain_constants
 from altijax.elevation_estimate.posterior import Constants
 from altijax.recordings import Recording
@@ -60,22 +60,32 @@ def prior_constants(
     return Constants(names=order, mean=np.array([mean[name] for name in order]), covariance=covariance)
 
 
-def with_corrected_yaw_gyro(recording: Recording, calibration: Calibration | None) -> Recording:
-    """The recording with its yaw gyro corrected: what is left of it is `yaw_rate_bias`, a constant of the elevation.
+def with_corrected_turns(recording: Recording, calibration: Calibration | None) -> Recording:
+    """The recording with its rates of turn corrected: what is left is `yaw_rate_bias`, a constant of the elevation.
 
     Parameters
     ----------
     recording : Recording
         The recording.
     calibration : Calibration, optional
-        Of which the bias and the scale of the gyro about z count.
+        Of which the bias and the scale of the gyro about z count, and for single wheels their scale, their difference
+        and the track width.
 
     Returns
     -------
     recording : Recording
-        The same without a calibration or a gyro.
+        The same without a calibration.
     """
-    imu = imu_of(recording)
-    if calibration is None or "gz" not in imu:
+    if calibration is None:
         return recording
-    return replace(recording, imu=imu.assign(gz=correct_imu(imu, calibration)["gz"]))
+    known = calibration.values
+    imu, wheel, pair = imu_of(recording), recording.wheel, wheel_pair(recording)
+    if "gz" in imu:
+        imu = imu.assign(gz=correct_imu(imu, calibration)["gz"])
+    if wheel is not None and pair is not None:
+        half = known.get("wheel_difference", 0.0) / 2
+        scale = known.get("wheel_scale", 1.0)
+        left, right = pair
+        wheel = wheel.assign(**{left: wheel[left] * scale * (1 - half), right: wheel[right] * scale * (1 + half)})
+    track_width = known.get("track_width", recording.track_width)
+    return replace(recording, imu=imu, wheel=wheel, track_width=track_width)

@@ -16,7 +16,27 @@ from altijax.recordings import read_recording
 from altijax.sensors import Accelerometer, Gyro
 
 TRUTH = np.array(
-    [1.013, -0.03, 0.16, 0.2, -0.15, 0.1, 0.996, 0.004, -0.006, 0.005, 0.06, -0.03, 1.004, 0.05, 0.001, 1.2, -0.4]
+    [
+        1.013,
+        -0.03,
+        0.16,
+        0.2,
+        -0.15,
+        0.1,
+        0.996,
+        0.004,
+        -0.006,
+        0.005,
+        0.06,
+        -0.03,
+        1.004,
+        0.05,
+        0.001,
+        1.2,
+        -0.4,
+        0.01,
+        1.6,
+    ]
 )
 DENSITY = {"gyro": float(MEMS_GYRO.noise_density), "accelerometer": float(MEMS_ACCELEROMETER.noise_density)}
 DENSITY["receiver"] = 0.0
@@ -66,6 +86,8 @@ def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
     for name, true in {"wheel_delay": -0.03, "wheel_scale": 1.0087}.items():
         assert abs(value[name] - true) < 2 * std[name]
     assert std["wheel_scale"] < 1e-3
+    # the rear wheels one by one: alike, and as far apart as on cars of that size
+    assert abs(value["wheel_difference"]) < 2e-3 and abs(value["track_width"] - 1.55) < 2 * std["track_width"] < 0.2
     part = calibrate_drive(recording, until=41.0)
     assert list(part.held_out.columns) == ["nominal", "fitted", "worse"]
     assert part.held_out.loc["wheel", "fitted"] < part.held_out.loc["wheel", "nominal"]
@@ -74,7 +96,7 @@ def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
 def test_without_wheels_the_others_are_found_and_theirs_are_named(data_dir: Path) -> None:
     calibration = calibrate_drive(read_recording(data_dir / "rtk-drive"))
     table = calibration.table
-    wheels = ["wheel_scale", "wheel_delay", "wheel_slip"]
+    wheels = ["wheel_scale", "wheel_delay", "wheel_slip", "wheel_difference", "track_width"]
     np.testing.assert_allclose(table.loc[wheels, "std"], table.loc[wheels, "prior_std"], rtol=1e-6)
     assert all(f"less of {name} than" in str(calibration) for name in wheels)
     # a town's corners tell where axle and antenna are
@@ -86,7 +108,9 @@ def test_mistakes_are_named(data_dir: Path) -> None:
     with pytest.raises(ValueError, match="shorter than a stretch of 21 s"):
         zeros = np.zeros((50, 3))
         t = np.arange(50) / 10
-        drive_stretches({"t": t, "f": zeros, "w": zeros, "t_gnss": t, "v_gnss": zeros, "t_wheel": t, "wheel": t}, 9.8)
+        drive_stretches(
+            {"t": t, "f": zeros, "w": zeros, "t_gnss": t, "v_gnss": zeros, "t_wheel": t, "wheel": t, "apart": t}, 9.8
+        )
     with pytest.raises(ValueError, match="lacks a stream"):
         calibrate_drive(replace(read_recording(data_dir / "umn-thor75"), gnss=None))
     stretches = drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665)

@@ -24,7 +24,27 @@ def test_drive_stops_turns_and_climbs() -> None:
 
 def test_recorded_readings_are_the_ideal_ones_through_the_parameters() -> None:
     truth = np.array(
-        [1.02, 0.1, 0.2, 0.1, -0.2, 0.05, 1.005, 0.002, -0.003, 0.004, 0.05, -0.02, 1.004, 0.0, 0.0, 0.0, 0.0]
+        [
+            1.02,
+            0.1,
+            0.2,
+            0.1,
+            -0.2,
+            0.05,
+            1.005,
+            0.002,
+            -0.003,
+            0.004,
+            0.05,
+            -0.02,
+            1.004,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.01,
+            1.6,
+        ]
     )
     recorded = recorded_drive(
         READINGS,
@@ -46,3 +66,5 @@ def test_recorded_readings_are_the_ideal_ones_through_the_parameters() -> None:
     np.testing.assert_allclose(recorded["v_gnss"][30], READINGS.velocity[298], atol=1e-9)
     assert np.isnan(recorded["v_gnss"][0]).all()  # it would report what was before the drive
     np.testing.assert_allclose(recorded["wheel"][200] * 1.02, READINGS.speed[401], atol=1e-9)
+    apart = 1.6 * READINGS.w_b[401, 2] - 0.01 * READINGS.speed[401]
+    np.testing.assert_allclose(recorded["apart"][200] * 1.02, apart, atol=1e-9)

@@ -10,7 +10,7 @@ from altijax.calibration.records import Calibration, constants_table
 from altijax.drives import Drive, drive_arrays
 from altijax.elevation_estimate.estimates import estimate_elevation
 from altijax.elevation_estimate.model import UNCERTAINTY
-from altijax.elevation_estimate.priors import prior_constants, with_corrected_yaw_gyro
+from altijax.elevation_estimate.priors import prior_constants, with_corrected_turns
 from tests.exact import EXACT
 
 ABSORBED = pd.DataFrame({"mounting_pitch": [9.8]}, index=["accelerometer_bias_x"])
@@ -65,11 +65,26 @@ def test_a_constant_of_no_elevation_is_left_out(drive: Drive) -> None:
 def test_the_yaw_gyro_is_corrected_where_it_is_used() -> None:
     """With a track width the wheels tell the rate of turn."""
     biased = dataclasses.replace(EXACT, imu=EXACT.imu.assign(gz=EXACT.imu["gz"] + 0.1))
-    corrected = with_corrected_yaw_gyro(biased, YAW_GYRO)
+    corrected = with_corrected_turns(biased, YAW_GYRO)
     np.testing.assert_allclose(corrected.imu["gz"], EXACT.imu["gz"], atol=1e-12)
-    assert with_corrected_yaw_gyro(biased, BIAS).imu.equals(biased.imu)
+    assert with_corrected_turns(biased, BIAS).imu.equals(biased.imu)
     by_gyro = dataclasses.replace(biased, track_width=None)
     wrong, right = (estimate_elevation(by_gyro, method="shirai", calibration=c) for c in (None, YAW_GYRO))
     assert abs(right["elevation"] - wrong["elevation"]).max() > 1.0
     reference = estimate_elevation(dataclasses.replace(EXACT, track_width=None), method="shirai")
     np.testing.assert_allclose(right["elevation"], reference["elevation"], atol=1e-9)
+
+
+def test_single_wheels_are_corrected_where_they_tell_the_rate_of_turn() -> None:
+    assert EXACT.wheel is not None and EXACT.track_width is not None
+    true = EXACT.wheel
+    shown = true.assign(left=true["left"] / 1.02 / 0.995, right=true["right"] / 1.02 / 1.005)
+    rows = {"wheel_scale": (1.02, 1.0), "wheel_difference": (0.01, 0.0), "track_width": (EXACT.track_width, 1.5)}
+    table = pd.DataFrame.from_dict(rows, orient="index", columns=["value", "prior"])
+    table = constants_table(table.assign(std=1e-3, unit="", prior_std=0.1))
+    found = dataclasses.replace(
+        BIAS, method="drive", table=table, correlation=pd.DataFrame(np.eye(3), table.index, table.index)
+    )
+    corrected = with_corrected_turns(dataclasses.replace(EXACT, wheel=shown, track_width=None), found)
+    assert corrected.track_width == EXACT.track_width
+    np.testing.assert_allclose(corrected.wheel, shown.assign(left=true["left"], right=true["right"]), atol=1e-12)
