@@ -7,7 +7,7 @@ less (Huber). A parameter that the drive does not determine keeps its prior and 
 
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -144,8 +144,7 @@ def calibrate_stretches(
     chosen = np.array([name in names for name in DRIVE_PARAMETERS])
     prior = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
     prior_std = np.where(chosen, [row[1] for row in DRIVE_PARAMETERS.values()], 0.0)
-    used = jax.tree.map(lambda leaf: leaf[fitted], stretches)
-    fit, used, noise = fit_drive(used, prior, prior_std)
+    fit, noise = _fit_drive(_seen(stretches, fitted), prior, prior_std)
     rows = np.flatnonzero(chosen)
     found = identify_information(fit.information[rows][:, rows], jnp.asarray(prior_std[rows]), names=_ordered(names))
     values = np.asarray(fit.shared)[rows]
@@ -163,7 +162,7 @@ def calibrate_stretches(
     )
     held_out = pd.DataFrame()
     if not fitted.all():
-        rest = _with_noise(jax.tree.map(lambda leaf: leaf[~fitted], stretches), noise / np.asarray(_FIRST_STD))
+        rest = _with_noise(_seen(stretches, ~fitted), noise / np.asarray(_FIRST_STD))
         sizes = {}
         for name, at in (("nominal", prior), ("fitted", np.asarray(fit.shared))):
             own = _own0(rest)
@@ -181,8 +180,8 @@ def calibrate_stretches(
     )
 
 
-def fit_drive(stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray) -> tuple[SharedFit, Stretch, np.ndarray]:
-    """Fit, noise from its residuals, and fit with that noise; returns it, the reweighted stretches and the noise."""
+def _fit_drive(stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray) -> tuple[SharedFit, np.ndarray]:
+    """Fit, noise from its residuals, and fit with that noise; returns this fit and the noise."""
     noise = np.asarray(_FIRST_STD)
     own, own_std = _own0(stretches), _own_std(stretches)
     fit = _solve(stretches, prior, prior_std, own, own_std, start=(prior, own))
@@ -191,7 +190,7 @@ def fit_drive(stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray) -> t
         factor = np.maximum(factor, _LEAST_STD / noise)
         noise, stretches = noise * factor, _with_noise(stretches, factor)
         fit = _solve(stretches, prior, prior_std, own, own_std, start=(fit.shared, fit.own))
-    return fit, stretches, noise
+    return fit, noise
 
 
 def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: Mapping[str, float] = NOISE) -> Stretch:
@@ -341,12 +340,15 @@ def _group_factor(r: np.ndarray) -> float:
 
 
 def _with_noise(stretches: Stretch, factor: np.ndarray) -> Stretch:
-    return Stretch(
-        **{
-            **vars(stretches),
-            "gnss_std": stretches.gnss_std * factor[:2],
-            "wheel_std": stretches.wheel_std * factor[2:],
-        }
+    return replace(stretches, gnss_std=stretches.gnss_std * factor[:2], wheel_std=stretches.wheel_std * factor[2:])
+
+
+def _seen(stretches: Stretch, which: np.ndarray) -> Stretch:
+    """The observations of some stretches, the others' missing: cut out, each number of them would compile anew."""
+    return replace(
+        stretches,
+        gnss_std=jnp.where(which[:, None, None], stretches.gnss_std, jnp.inf),
+        wheel_std=jnp.where(which[:, None, None], stretches.wheel_std, jnp.inf),
     )
 
 
