@@ -14,7 +14,7 @@ other optimiser is needed.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -67,6 +67,17 @@ class SharedFit:
     nis: jax.Array
     steps: jax.Array
     converged: jax.Array
+
+
+class _Linearised(NamedTuple):
+    """All stretches about one place, by the parameters in units of their priors: shared ones, then own ones."""
+
+    loss: jax.Array
+    residuals: jax.Array
+    weights: jax.Array
+    hessian: jax.Array
+    gradient: jax.Array
+    weighted_jacobian: jax.Array
 
 
 def fit_shared(
@@ -122,26 +133,27 @@ def fit_shared(
     own_std = require_shape("own_std", own_std, own0.shape[1:])
     terms, states = shared0.size, own_std.size
 
-    def linearised(u: jax.Array, u_own: jax.Array) -> tuple:
+    def linearised(u: jax.Array, u_own: jax.Array) -> _Linearised:
         shared = shared0 + shared_std * u
 
-        def one(own: jax.Array, stretch: Any) -> tuple:
+        def one(own: jax.Array, stretch: Any) -> _Linearised:
             # Two passes: what depends on the shared parameters alone is then not differentiated by the many own ones.
             r, by_shared = _columns(lambda shared: residual(shared, own, stretch), shared, shared_std)
             _, by_own = _columns(lambda own: residual(shared, own, stretch), own, own_std)
             J = jnp.concatenate([by_shared, by_own], -1)
             w = _weights(r, loss)
             weighted = J * w[:, None]
-            return _loss(r, loss), r, w, J.T @ weighted, weighted.T @ r, weighted
+            return _Linearised(_loss(r, loss), r, w, J.T @ weighted, weighted.T @ r, weighted)
 
         return jax.vmap(one)(own0 + own_std * u_own, stretches)
 
-    def cost_of(u: jax.Array, u_own: jax.Array, found: tuple) -> jax.Array:
-        return jnp.sum(found[0]) + u @ u + jnp.sum(u_own**2)
+    def cost_of(u: jax.Array, u_own: jax.Array, found: _Linearised) -> jax.Array:
+        return jnp.sum(found.loss) + u @ u + jnp.sum(u_own**2)
 
-    def reduced(found: tuple, damping: ArrayLike) -> tuple[jax.Array, Callable]:
+    def reduced(found: _Linearised, damping: ArrayLike) -> tuple[jax.Array, Callable]:
         """Information on the shared parameters with the own ones averaged over, and the step down given slopes."""
-        hessian, identity = found[3], partial(jnp.eye, dtype=found[3].dtype)
+        hessian = found.hessian
+        identity = partial(jnp.eye, dtype=hessian.dtype)
         block = hessian[:, terms:, terms:] + (1 + damping) * identity(states)
         across = hessian[:, terms:, :terms]
         back = jnp.linalg.solve(block, across)
@@ -154,7 +166,7 @@ def fit_shared(
 
         return information, down
 
-    def bent(u: jax.Array, u_own: jax.Array, found: tuple, step: tuple, down: Callable) -> tuple:
+    def bent(u: jax.Array, u_own: jax.Array, found: _Linearised, step: tuple, down: Callable) -> tuple:
         """The step with its correction of second order, where that is the smaller part."""
 
         def second(own0: jax.Array, u_own: jax.Array, own_step: jax.Array, stretch: Any) -> jax.Array:
@@ -166,7 +178,7 @@ def fit_shared(
             zero, one = jnp.zeros_like(u[0]), jnp.ones_like(u[0])
             return jax.jvp(lambda s: jax.jvp(along, (s,), (one,))[1], (zero,), (one,))[1]
 
-        slopes = jnp.einsum("wot,wo->wt", found[5], jax.vmap(second)(own0, u_own, step[1], stretches))
+        slopes = jnp.einsum("wot,wo->wt", found.weighted_jacobian, jax.vmap(second)(own0, u_own, step[1], stretches))
         bend = down(jnp.sum(slopes[:, :terms], 0), slopes[:, terms:])
         length, bending = (jnp.sqrt(jnp.sum(v[0] ** 2) + jnp.sum(v[1] ** 2)) for v in (step, bend))
         share = jnp.where(bending <= _MOST_BEND * length, 0.5, 0.0)
@@ -185,7 +197,7 @@ def fit_shared(
         harder = jnp.where(accepted, damping / 5, jnp.maximum(damping, 1e-3) * 3)
         damping = jnp.where(first, damping, harder)
         _, down = reduced(found, damping)
-        gradient = found[4]
+        gradient = found.gradient
         step = down(jnp.sum(gradient[:, :terms], 0) + u, gradient[:, terms:] + u_own)
         du, du_own = bent(u, u_own, found, step, down)
         return u, u_own, found, damping, (u + du, u_own + du_own), steps + 1, ~first & accepted & small
@@ -202,7 +214,7 @@ def fit_shared(
     )
     information, _ = reduced(found, 0.0)
     scale = jnp.outer(shared_std, shared_std)
-    _, r, w, *_ = found
+    r, w = found.residuals, found.weights
     observations = jnp.maximum(jnp.sum(r != 0), 1)
     return SharedFit(
         shared=shared0 + shared_std * u,
