@@ -23,6 +23,7 @@ from altijax.recordings import Recording
 MOTION_METHODS = ("epoch", "window", "batch")
 
 _LEVELS = tuple(field.name for field in fields(MotionNoise))
+_SLIP_LEVELS = ("sideslip", "attack", "slip_time")
 _WALKS = ("gyro_walk", "accelerometer_walk")
 _WITH_GYRO = MotionNoise()
 # Without a gyro the attitude walks as the vehicle turns, and what lasts of its rate walks as well.
@@ -42,6 +43,8 @@ _ACCELEROMETER_SCALE_STD = 0.015
 _AXES_STD = 0.01
 _RATE_STD = 0.3  # of the vehicle's own turning, without a gyro, rad/s
 _MOUNT_STD, _WIND_STD = 0.1, 10.0
+# Heights are the weakest direction of GNSS, and receivers smooth the climb more than the rest: how much later it is, s.
+_CLIMB_DELAY_STD = 0.1
 # The course is trusted to so many radians where the epoch alone must do.
 _COURSE_STD = 0.3
 _WINDOW = 15.0  # s
@@ -102,14 +105,16 @@ def estimate_motion(
         direction of travel, through the air or over ground. By itself: with a gyro it is free; without one it is held,
         and the wind is in it where the courses flown show one. Only "batch" knows wind.
     delay : float, optional
-        How late the stamps of the GNSS velocities are, in s; estimated by default ("epoch" cannot, and takes 0).
+        How late the stamps of the GNSS velocities are, in s; estimated by default ("epoch" cannot, and takes 0), in
+        "batch" with how much later still the vertical ones are.
 
     Returns
     -------
     estimate : DataFrame
         Indexed as ``recording.imu``: roll, pitch, heading (rad), v_e, v_n, v_u (m/s), the standard deviation of each
         (``roll_std`` ...), and valid, False where no GNSS velocity is near or the IMU has a gap. ``attrs`` has the
-        delay, noise levels, constants, wind and the normalised innovations squared (1 where the error bars are right).
+        delay, noise levels, constants, wind and the normalised innovations squared (1 where the error bars are right);
+        ``attrs["climb_delay"]`` is how much later the vertical velocities are than the horizontal ones, in s.
 
     Raises
     ------
@@ -190,18 +195,20 @@ def _found_batch(
         first = _delay_by_windows(*motion_readings(recording, use_gyro=use_gyro, delay=first))
     batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first, beliefs)
     batch = _most_probable(readings, batch, steps, estimate_delay=delay is None)
-    if wind == "auto" and not use_gyro and _turns_around(readings):
-        with_wind = batch.prior.covariance.at[[16, 17], [16, 17]].set(_WIND_STD**2)
+    if wind == "auto" and not use_gyro and _turns_around(readings, np.zeros(2)):
+        with_wind = batch.prior.covariance.at[[17, 18], [17, 18]].set(_WIND_STD**2)
         windy = _most_probable(
             readings,
             replace(batch, prior=replace(batch.prior, covariance=with_wind)),
             steps,
             estimate_delay=delay is None,
         )
-        vector = np.asarray(windy.fit.trajectory.constants)[4:]
-        error = np.sqrt(np.diag(np.asarray(windy.fit.covariance)[-1])[16:])
-        # Ten in the logarithm pays for two more constants many times over; below 1 m/s a wind is a crooked mount.
-        if batch.objective - windy.objective > 10 and np.hypot(*vector) > max(1.0, 4 * float(np.max(error))):
+        vector = np.asarray(windy.fit.trajectory.constants)[5:7]
+        error = np.sqrt(np.diag(np.asarray(windy.fit.covariance)[-1])[17:19])
+        # Ten in the logarithm pays for two more constants many times over; below 1 m/s a wind is a crooked mount, and
+        # one in which all courses are the same would let body x point anywhere.
+        shown = batch.objective - windy.objective > 10 and np.hypot(*vector) > max(1.0, 4 * float(np.max(error)))
+        if shown and _turns_around(readings, vector):
             batch = windy
     return batch, readings, steps
 
@@ -236,7 +243,7 @@ def batch_with_constants(recording: Recording) -> Callable[[Calibration], pd.Dat
         beliefs = _beliefs(calibration)
         corrected = replace(recording, imu=correct_imu(imu_of(recording), calibration))
         again = _corrected_readings(readings, calibration, use_gyro)
-        known = _prior_covariance(corrected, use_gyro, float(found.prior.course) > 0, False, beliefs)
+        known = _prior_covariance(corrected, use_gyro, float(found.prior.course) > 0, False, False, beliefs)
         covariance = found.prior.covariance.at[6:15, 6:15].set(known[6:15, 6:15])
         batch = replace(
             found,
@@ -271,7 +278,7 @@ def _first_batch(
     noise = _as_arrays(_WITH_GYRO if use_gyro else _WITHOUT_GYRO)
     course = not use_gyro or wind != "auto"
     delay_prior = beliefs.delay or (_DELAY, _DELAY_STD)
-    covariance = _prior_covariance(recording, use_gyro, course, wind is True, beliefs)
+    covariance = _prior_covariance(recording, use_gyro, course, wind is True, delay is None, beliefs)
     search = delay is None and not use_gyro and beliefs.delay is None
     delays = _DELAYS_WITHOUT_GYRO if search else (first,)
     turns = (0.0, 0.5, 1.0, 1.5) if use_gyro else (0.0,)
@@ -303,11 +310,14 @@ def _first_batch(
     return best
 
 
-def _prior_covariance(recording: Recording, use_gyro: bool, course: bool, wind: bool, beliefs: _Beliefs) -> np.ndarray:
+def _prior_covariance(
+    recording: Recording, use_gyro: bool, course: bool, wind: bool, lag: bool, beliefs: _Beliefs
+) -> np.ndarray:
     """Of the states before anything is known of the drive."""
     std = [_ATTITUDE_STD] * 3 + [_VELOCITY_STD] * 3 + [*beliefs.accelerometer_bias]
     std += [*beliefs.gyro_bias, *beliefs.gyro_scale] if use_gyro else [_RATE_STD] * 3 + [0.0] * 3
-    std += [_MOUNT_STD if course else 0.0] + [_WIND_STD if wind else 0.0] * 2
+    std += [_MOUNT_STD if course else 0.0] * 2 + [_WIND_STD if wind else 0.0] * 2
+    std += [_CLIMB_DELAY_STD if lag else 0.0] + [0.0] * 2
     covariance = np.diag(np.square(std))
     force = imu_of(recording)[["ax", "ay", "az"]].to_numpy(float).mean(0)
     by_scale = beliefs.accelerometer_scale * force
@@ -319,7 +329,7 @@ def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estim
     """Noise levels, delay and trajectory in turns, until the levels stay."""
     prior, noise, delay = batch.prior, batch.noise, batch.delay
     trajectory = batch.fit.trajectory
-    names = [name for name in _LEVELS if name != "course" or float(prior.course) > 0]
+    names = [name for name in _LEVELS if name not in _SLIP_LEVELS or float(prior.course) > 0]
     start = _WITH_GYRO if float(prior.covariance[12, 12]) > 0 else _WITHOUT_GYRO
     nominal = np.append(np.log([float(getattr(start, name)) for name in names]), batch.delay_prior[0])
     spread = np.append([_WALK_SPREAD if name in _WALKS else _SPREAD for name in names], batch.delay_prior[1])
@@ -429,9 +439,9 @@ def _as_arrays(noise: MotionNoise) -> MotionNoise:
     return MotionNoise(**{name: jnp.asarray(np.float64(getattr(noise, name))) for name in _LEVELS})
 
 
-def _turns_around(readings: MotionReadings) -> bool:
-    """Whether the courses spread enough to tell a wind from a crooked mount."""
-    v = np.asarray(readings.v_gnss)[np.isfinite(np.asarray(readings.std)[:, 0]), :2]
+def _turns_around(readings: MotionReadings, wind: np.ndarray) -> bool:
+    """Whether the courses through the air spread enough to tell a wind from a crooked mount."""
+    v = np.asarray(readings.v_gnss)[np.isfinite(np.asarray(readings.std)[:, 0]), :2] - wind
     speed = np.hypot(*v.T)
     moving = speed > 3.0
     return bool(moving.sum() > 10 and np.linalg.norm(np.mean(v[moving] / speed[moving, None], 0)) < 0.8)
@@ -446,7 +456,8 @@ def _summary(readings: MotionReadings, batch: _Batch) -> dict[str, object]:
         "noise": {name: float(getattr(batch.noise, name)) for name in _LEVELS},
         "nis": float(np.mean(surprise**2)),
         "outliers": int(np.sum(np.asarray(batch.prior.doubt)[there] > 1)),
-        "wind": constants[4:].tolist() if float(batch.prior.covariance[16, 16]) > 0 else None,
+        "wind": constants[5:7].tolist() if float(batch.prior.covariance[17, 17]) > 0 else None,
+        "climb_delay": float(constants[7]),
         "gyro_scale": (1 / (1 + constants[:3])).tolist(),
         "accelerometer_bias": np.asarray(batch.fit.trajectory.accelerometer_bias).mean(0).tolist(),
         "gyro_bias": np.asarray(batch.fit.trajectory.gyro_bias).mean(0).tolist(),

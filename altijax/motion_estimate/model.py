@@ -7,11 +7,13 @@ The error state of each instant, about the trajectory it is linearised at:
     6-8    accelerometer bias, m/s^2
     9-11   gyro bias, rad/s
     12-14  inverse gyro scale less one
-    15     yaw of body x from the direction of travel through the air, rad
-    16-17  wind towards East and North, m/s
+    15-16  yaw and pitch of body x from the direction of travel through the air, on average, rad
+    17-18  wind towards East and North, m/s
+    19     how much later than the horizontal velocities the vertical ones are, s
+    20-21  sideslip and attack: by how much yaw and pitch of body x differ from that average, rad
 
-The last six are constants. A state that does not exist has zero prior variance. Without a gyro the readings of the rate
-are zero: the attitude walks at random, and the bias takes the part of the rate of turn that lasts.
+Of these 12 to 19 are constants. A state that does not exist has zero prior variance. Without a gyro the readings of the
+rate are zero: the attitude walks at random, and the bias takes the part of the rate of turn that lasts.
 
 The trajectory need not obey its own dynamics: what is missing at each step is part of the model, so that repeating
 linearisation and smoothing is the Gauss-Newton method on the whole record and ends at its most probable trajectory.
@@ -28,7 +30,7 @@ from altijax._shapes import require_shape
 from altijax.motion_estimate.preintegration import Preintegrated, preintegrate, relative_attitudes
 from altijax.rotations import matrix_to_rotvec, rotvec_to_matrix, skew
 
-STATES = 18
+STATES = 22
 
 # Speed through the air below which body x says little of the direction of travel, m/s.
 _SLIP = 0.5
@@ -55,8 +57,12 @@ class MotionNoise:
         Factor on the standard deviations of the horizontal velocities.
     vertical : ()
         The same of the vertical ones.
-    course : () rad s^0.5
-        Body x against the direction of travel, for a mean over one second.
+    sideslip : () rad
+        Standard deviation of the sideslip: the yaw of body x from the direction of travel.
+    attack : () rad
+        The same of the angle of attack: its pitch from there.
+    slip_time : () s
+        How long both last: the correlation time of a Gauss-Markov process of the first order.
     """
 
     rotation: ArrayLike = 0.005
@@ -65,7 +71,9 @@ class MotionNoise:
     accelerometer_walk: ArrayLike = 1e-3
     horizontal: ArrayLike = 1.0
     vertical: ArrayLike = 1.0
-    course: ArrayLike = 0.1
+    sideslip: ArrayLike = 0.1
+    attack: ArrayLike = 0.1
+    slip_time: ArrayLike = 3.0
 
 
 @jax.tree_util.register_dataclass
@@ -83,15 +91,18 @@ class Trajectory:
         Bias.
     gyro_bias : (time, 3) rad/s
         Bias.
-    constants : (6,)
-        Inverse gyro scales less one (3), yaw of body x from the direction of travel (rad), wind to East and North
-        (m/s).
+    slip : (time, 2) rad
+        Sideslip and attack.
+    constants : (8,)
+        Inverse gyro scales less one (3), yaw and pitch of body x from the direction of travel (rad), wind to East and
+        North (m/s), delay of the vertical velocities beside the horizontal ones (s).
     """
 
     C_nb: jax.Array
     v_n: jax.Array
     accelerometer_bias: jax.Array
     gyro_bias: jax.Array
+    slip: jax.Array
     constants: jax.Array
 
 
@@ -169,11 +180,11 @@ def motion_transitions(
 
     Returns
     -------
-    F : (intervals, 18, 18)
+    F : (intervals, 22, 22)
         Derivative of the state by the one before.
-    c : (intervals, 18)
+    c : (intervals, 22)
         What is missing for the trajectory to obey its own dynamics.
-    Q : (intervals, 18, 18)
+    Q : (intervals, 22, 22)
         Covariance of the noise.
     """
     preintegrated, miss = preintegrated_intervals(trajectory, intervals)
@@ -181,7 +192,15 @@ def motion_transitions(
     down = jnp.array([0, 0, -1], gravity.dtype) * gravity
 
     def one(
-        C: jax.Array, v: jax.Array, v_next: jax.Array, p: Preintegrated, miss: jax.Array, dt: jax.Array, gap: jax.Array
+        C: jax.Array,
+        v: jax.Array,
+        v_next: jax.Array,
+        p: Preintegrated,
+        miss: jax.Array,
+        dt: jax.Array,
+        gap: jax.Array,
+        slip: jax.Array,
+        slip_next: jax.Array,
     ) -> tuple[jax.Array, jax.Array, jax.Array]:
         gained = C @ p.velocity[-1]
         by_turn = C @ p.velocity_by_turn @ C.T
@@ -204,6 +223,11 @@ def motion_transitions(
         Q = Q.at[3:6, 3:6].set(turned * (by_turn @ by_turn.T + wander) + moved * identity)
         Q = Q.at[6:9, 6:9].set(noise.accelerometer_walk**2 * dt * identity)
         Q = Q.at[9:12, 9:12].set(noise.gyro_walk**2 * dt * identity)
+        kept = jnp.exp(-dt / noise.slip_time)
+        F = F.at[20:, 20:].set(kept * jnp.eye(2, dtype=C.dtype))
+        slips = jnp.stack([jnp.asarray(noise.sideslip), jnp.asarray(noise.attack)])
+        Q = Q.at[20:, 20:].set(jnp.diag(slips**2 * -jnp.expm1(-2 * dt / noise.slip_time)))
+        c = c.at[20:].set(kept * slip - slip_next)
         return F, c, Q
 
     before, after = slice(None, -1), slice(1, None)
@@ -215,13 +239,15 @@ def motion_transitions(
         miss,
         intervals.duration,
         intervals.gap,
+        trajectory.slip[before],
+        trajectory.slip[after],
     )
     c = c.at[:, 6:9].set(trajectory.accelerometer_bias[before] - trajectory.accelerometer_bias[after])
     return F, c.at[:, 9:12].set(trajectory.gyro_bias[before] - trajectory.gyro_bias[after]), Q
 
 
 def motion_measurements(
-    trajectory: Trajectory, v_gnss: ArrayLike, variance: ArrayLike, course_variance: ArrayLike
+    trajectory: Trajectory, v_gnss: ArrayLike, variance: ArrayLike, slip_variance: ArrayLike, climbing: ArrayLike
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Measurements at each instant: three velocities, and the direction of travel against body x.
 
@@ -233,39 +259,45 @@ def motion_measurements(
         Measured velocity.
     variance : (time, 3) m^2/s^2
         Its variances; infinite where there is no measurement.
-    course_variance : (time,) rad^2
-        Variance of the angle between body x and the direction of travel; infinite where it is not to be used.
+    slip_variance : (time,) rad^2
+        Variance of what mount and slips leave of the angles between body x and the direction of travel; infinite where
+        these are not to be used.
+    climbing : (time,) m/s^2
+        Vertical acceleration just before each instant.
 
     Returns
     -------
-    z : (time, 4)
+    z : (time, 5)
         Measurement less what the trajectory has.
-    H : (time, 4, 18)
+    H : (time, 5, 22)
         Derivative by the error state.
-    R : (time, 4)
+    R : (time, 5)
         Variances.
     """
     v_gnss = require_shape("v_gnss", v_gnss, (None, 3))
     variance = require_shape("variance", variance, v_gnss.shape)
-    course_variance = require_shape("course_variance", course_variance, v_gnss.shape[:1])
+    slip_variance = require_shape("slip_variance", slip_variance, v_gnss.shape[:1])
+    climbing = require_shape("climbing", climbing, v_gnss.shape[:1])
 
-    def angle(x: jax.Array, C: jax.Array, v: jax.Array) -> jax.Array:
-        """Body x clockwise from the direction of travel, less its constant part: zero on average."""
-        forward = (rotvec_to_matrix(x[:3]) @ C)[:, 0]
-        constants = trajectory.constants + x[12:]
-        air = (v + x[3:6])[:2] - constants[4:6]
-        across = forward[0] * air[1] - forward[1] * air[0]
-        return _safe.arctan2(across, forward[:2] @ air) + constants[3]
+    def seen(x: jax.Array, C: jax.Array, v: jax.Array, slip: jax.Array, climbing: jax.Array) -> jax.Array:
+        """Velocities, and by how much mount and slips miss the yaw and pitch of body x from the direction of travel."""
+        constants = trajectory.constants + x[12:20]
+        v, slip = v + x[3:6], slip + x[20:] + constants[3:5]
+        wind = jnp.append(constants[5:7], 0.0)
+        forward, left, up = (rotvec_to_matrix(x[:3]) @ C).T @ (v - wind)
+        yaw = _safe.arctan2(left, forward) + slip[0]
+        pitch = _safe.arctan2(up, _safe.norm(jnp.stack([forward, left]))) + slip[1]
+        return jnp.concatenate([v.at[2].add(-constants[7] * climbing), jnp.stack([yaw, pitch])])
 
     zero = jnp.zeros(STATES, v_gnss.dtype)
-    misses, slopes = jax.vmap(jax.value_and_grad(angle), in_axes=(None, 0, 0))(zero, trajectory.C_nb, trajectory.v_n)
-    air = trajectory.v_n[:, :2] - trajectory.constants[4:6]
-    course_variance = course_variance + _SLIP**2 / jnp.maximum(jnp.sum(air * air, -1), 1e-6)
-    R = jnp.concatenate([variance, course_variance[:, None]], -1)
+    inputs = trajectory.C_nb, trajectory.v_n, trajectory.slip, climbing
+    at = jax.vmap(seen, in_axes=(None, 0, 0, 0, 0))(zero, *inputs)
+    H = jax.vmap(jax.jacfwd(seen), in_axes=(None, 0, 0, 0, 0))(zero, *inputs)
+    air = trajectory.v_n.at[:, :2].add(-trajectory.constants[5:7])
+    slip_variance = slip_variance + _SLIP**2 / jnp.maximum(jnp.sum(air * air, -1), 1e-6)
+    R = jnp.concatenate([variance, slip_variance[:, None], slip_variance[:, None]], -1)
     there = jnp.isfinite(R)
-    z = jnp.concatenate([v_gnss - trajectory.v_n, -misses[:, None]], -1)
-    velocity = jnp.broadcast_to(jnp.zeros((3, STATES)).at[:, 3:6].set(jnp.eye(3)), (len(z), 3, STATES))
-    H = jnp.concatenate([velocity.astype(z.dtype), slopes[:, None]], -2)
+    z = jnp.concatenate([v_gnss, jnp.zeros_like(v_gnss[:, :2])], -1) - at
     return jnp.where(there, z, 0), jnp.where(there[..., None], H, 0), jnp.where(there, R, 1)
 
 
@@ -277,5 +309,6 @@ def moved(trajectory: Trajectory, x: ArrayLike) -> Trajectory:
         v_n=trajectory.v_n + x[:, 3:6],
         accelerometer_bias=trajectory.accelerometer_bias + x[:, 6:9],
         gyro_bias=trajectory.gyro_bias + x[:, 9:12],
-        constants=trajectory.constants + x[-1, 12:],
+        slip=trajectory.slip + x[:, 20:],
+        constants=trajectory.constants + x[-1, 12:20],
     )

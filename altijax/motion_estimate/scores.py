@@ -92,8 +92,9 @@ def withheld_gnss_errors(recording: Recording, **options: object) -> pd.DataFram
     withheld, t = withheld[inside], t[inside]
     errors = {}
     for name in _VELOCITY:
-        errors[name] = np.interp(t, estimate.index, estimate[name]) - withheld[name].to_numpy(float)
-        errors[f"{name}_std"] = np.interp(t, estimate.index, estimate[f"{name}_std"])
+        at = t - estimate.attrs.get("climb_delay", 0.0) if name == "v_u" else t
+        errors[name] = np.interp(at, estimate.index, estimate[name]) - withheld[name].to_numpy(float)
+        errors[f"{name}_std"] = np.interp(at, estimate.index, estimate[f"{name}_std"])
     result = pd.DataFrame(errors, index=withheld.index)
     result.attrs = {"delay": estimate.attrs["delay"]}
     return result

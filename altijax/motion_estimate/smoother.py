@@ -14,6 +14,7 @@ from altijax import _safe
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
 from altijax.motion_estimate.model import (
     STATES,
+    Intervals,
     MotionNoise,
     Trajectory,
     motion_measurements,
@@ -26,6 +27,10 @@ from altijax.motion_estimate.state_smoother import filter_states, likelihood_gra
 # A velocity more than so many standard deviations from what all others say is trusted that much less.
 _GATE = 4.0
 _LONGEST_TURN = 0.7
+# What sideslip and attack leave of the angle between body x and the direction of travel, rad.
+_SLIP_LEFT = 0.01
+# Over how long the acceleration counts that late vertical velocities miss, s.
+_JUST_BEFORE = 0.15
 
 
 @jax.tree_util.register_dataclass
@@ -35,12 +40,12 @@ class MotionPrior:
 
     Attributes
     ----------
-    covariance : (18, 18)
+    covariance : (22, 22)
         Of the states; zero for those that do not exist.
     doubt : (time, 3)
         Factor on the variance of each velocity, 1 but for outliers.
     course : ()
-        1 where body x is held near the direction of travel, 0 where not.
+        1 where body x points in the direction of travel but for the mount and the slips, 0 where it may point anywhere.
     """
 
     covariance: jax.Array
@@ -57,7 +62,7 @@ class MotionFit:
     ----------
     trajectory : Trajectory
         States at each instant.
-    covariance : (time, 18, 18)
+    covariance : (time, 22, 22)
         Of the error state.
     log_likelihood : ()
         Of the noise levels and the delay, about the trajectory the pass began with.
@@ -195,12 +200,27 @@ def _linearised(
     there = jnp.isfinite(readings.std)
     variance = jnp.where(there, (factor * jnp.where(there, readings.std, 1)) ** 2 * prior.doubt, jnp.inf)
     used = there[:, 0] & (prior.course > 0)
-    course_variance = jnp.where(used, noise.course**2 / readings.spacing, jnp.inf)
-    z, H, R = motion_measurements(trajectory, readings.v_gnss, variance, course_variance)
+    slip_variance = jnp.where(used, _SLIP_LEFT**2, jnp.inf)
+    climbing = _climbing(trajectory, intervals, readings.gravity)
+    z, H, R = motion_measurements(trajectory, readings.v_gnss, variance, slip_variance, climbing)
     # Constants and biases are believed to be zero before the first measurement; attitude and velocity can be anything.
-    first = jnp.concatenate([trajectory.accelerometer_bias[0], trajectory.gyro_bias[0], trajectory.constants])
+    first = jnp.concatenate(
+        [trajectory.accelerometer_bias[0], trajectory.gyro_bias[0], trajectory.constants, trajectory.slip[0]]
+    )
     x0 = jnp.zeros(STATES, t.dtype).at[6:].set(-first)
-    return {"F": F, "c": c, "Q": Q, "z": z, "H": H, "R": R, "x0": x0, "P0": prior.covariance}
+    slips = jnp.stack([jnp.asarray(noise.sideslip), jnp.asarray(noise.attack)])
+    P0 = prior.covariance.at[20:, 20:].set(jnp.diag(slips**2))
+    return {"F": F, "c": c, "Q": Q, "z": z, "H": H, "R": R, "x0": x0, "P0": P0}
+
+
+def _climbing(trajectory: Trajectory, intervals: Intervals, gravity: jax.Array) -> jax.Array:
+    """Vertical acceleration just before each instant."""
+    steps = intervals.f_b.shape[1]
+    before_end = (1 - (jnp.arange(steps) + 0.5) / steps) * intervals.duration[:, None]
+    weight = (before_end < _JUST_BEFORE).at[:, -1].set(True)
+    f_b = jnp.einsum("kt,kti->ki", weight / jnp.sum(weight, 1, keepdims=True), intervals.f_b)
+    at_end = jnp.einsum("ki,ki->k", trajectory.C_nb[1:, 2], f_b) - gravity
+    return jnp.append(at_end[:1], at_end)
 
 
 def _against_all_others(

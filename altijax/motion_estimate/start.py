@@ -79,7 +79,8 @@ def window_attitudes(
         v_n=v,
         accelerometer_bias=zero,
         gyro_bias=zero,
-        constants=jnp.zeros(6, v.dtype),
+        slip=zero[:, :2],
+        constants=jnp.zeros(8, v.dtype),
     )
     covariance = jnp.concatenate([shared.covariance[:1], shared.covariance])
     misfit = jnp.sum(whole * shared.misfit**2) / jnp.maximum(jnp.sum(whole), 1)

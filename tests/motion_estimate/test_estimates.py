@@ -23,9 +23,13 @@ COLUMNS += [f"{name}_std" for name in COLUMNS] + ["valid"]
 
 @pytest.fixture(scope="module")
 def flight() -> Recording:
+    return flown(slope=0.05, wavelength=300.0)
+
+
+def flown(*, slope: float, wavelength: float, later_climb: float = 0.0) -> Recording:
     """A minute of turns in a wind, a biased IMU at 50 Hz from t = 5 s, and late GNSS at 1 Hz that ends early."""
     one = jnp.ones(1)
-    road = winding_road(1.2 * one, 250.0 * one, 0 * one, 0.05 * one, 300.0 * one, 0 * one, 0.0)
+    road = winding_road(1.2 * one, 250.0 * one, 0 * one, slope * one, wavelength * one, 0 * one, 0.0)
     pose = partial(flight_pose, road, rest_to_rest(2000.0, 100.0, 10.0), jnp.array([6.0, -4.0, 0.0]), 9.80665)
     t = np.arange(0, 60, 0.02)
     truth = jax.jit(partial(ideal_readings, pose))(jnp.asarray(t + 15.0), 9.80665)
@@ -37,7 +41,8 @@ def flight() -> Recording:
     reference = {"roll": euler[:, 0], "pitch": euler[:, 1], "heading": np.mod(np.pi / 2 - euler[:, 2], 2 * np.pi)}
     reference |= dict(zip(("v_e", "v_n", "v_u"), v.T, strict=True))
     epochs = np.arange(0.4, 56, 1.0)
-    measured = {name: np.interp(epochs, t, reference[name]) for name in ("v_e", "v_n", "v_u")}
+    late = {"v_e": 0.0, "v_n": 0.0, "v_u": later_climb}
+    measured = {name: np.interp(epochs - late[name], t, reference[name]) for name in late}
     gnss = pd.DataFrame(measured, index=pd.Index(epochs + 5 + DELAY, name="t"))
     return Recording(
         name="flight",
@@ -71,6 +76,16 @@ def test_truth_lies_within_the_stated_errors(flight: Recording, batch: pd.DataFr
     assert batch.attrs["delay"] == pytest.approx(DELAY, abs=0.03)
     np.testing.assert_allclose(batch.attrs["gyro_bias"], [0.01, -0.02, 0.015], atol=0.003)
     assert 0.5 < batch.attrs["nis"] < 2.0
+
+
+def test_without_a_gyro_the_direction_of_travel_tells_the_attitude() -> None:
+    """A climb that is reported later than the rest is noticed."""
+    recording = flown(slope=0.15, wavelength=100.0, later_climb=0.1)
+    estimate = estimate_motion(recording, use_gyro=False)
+    score = score_motion(estimate.loc[6.0:60.0], recording)
+    assert (score["rms"] / score["stated_std"]).drop("velocity").max() < 2.0, score
+    assert score.loc["roll", "rms"] < np.radians(4.0) and score.loc["pitch", "rms"] < np.radians(2.0), score
+    assert estimate.attrs["climb_delay"] == pytest.approx(0.1, abs=0.05)
 
 
 def test_the_reference_is_never_used(flight: Recording) -> None:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 
 from altijax.motion_estimate.model import (
     STATES,
@@ -35,7 +36,8 @@ def interval() -> tuple[Trajectory, Intervals]:
         v_n=jnp.tile(jnp.array([10.0, 5.0, 0.0]), (2, 1)),
         accelerometer_bias=jnp.full((2, 3), 0.02),
         gyro_bias=jnp.full((2, 3), -0.01),
-        constants=jnp.array([0.02, 0.0, -0.03, 0.1, 3.0, -2.0]),
+        slip=jnp.array([0.1, -0.05]) * jnp.exp(-jnp.arange(2.0) / MotionNoise().slip_time)[:, None],
+        constants=jnp.array([0.02, 0.0, -0.03, 0.1, 0.07, 3.0, -2.0, 0.1]),
     )
     return obeying(trajectory, intervals), intervals
 
@@ -81,10 +83,37 @@ def test_transition_carries_small_errors_as_the_motion_does() -> None:
 def test_measurements_miss_by_what_the_errors_predict() -> None:
     trajectory, _ = interval()
     x = 1e-5 * RNG.normal(size=(2, STATES))
-    x[0, 12:] = x[1, 12:]
+    x[0, 12:20] = x[1, 12:20]
     true = moved(trajectory, x)
     variance = jnp.ones((2, 3)).at[1, 2].set(jnp.inf)
-    z, H, R = motion_measurements(trajectory, true.v_n, variance, jnp.full(2, 0.01))
-    z_true, _, _ = motion_measurements(true, true.v_n, variance, jnp.full(2, 0.01))
+    climbing = jnp.array([2.0, -1.0])
+    z, H, R = motion_measurements(trajectory, true.v_n, variance, jnp.full(2, 0.01), climbing)
+    z_true, _, _ = motion_measurements(true, true.v_n, variance, jnp.full(2, 0.01), climbing)
     np.testing.assert_allclose(z - jnp.einsum("tij,tj->ti", H, x), z_true, atol=1e-8)
     assert float(R[1, 2]) == 1.0 and not H[1, 2].any() and float(z[1, 2]) == 0.0
+
+
+def test_late_vertical_velocities_are_those_of_a_moment_ago() -> None:
+    trajectory, _ = interval()
+    climbing = jnp.array([2.0, -1.0])
+    earlier = trajectory.v_n.at[:, 2].add(-trajectory.constants[7] * climbing)
+    z, _, _ = motion_measurements(trajectory, earlier, jnp.ones((2, 3)), jnp.full(2, jnp.inf), climbing)
+    np.testing.assert_allclose(z, 0, atol=1e-12)
+
+
+@pytest.mark.parametrize("bank", [0.0, 1.0])
+def test_slips_are_angles_of_the_body(bank: float) -> None:
+    """Body x points left of the way through the air by yaw and above it by pitch, in the body's own axes."""
+    trajectory, _ = interval()
+    yaw, pitch = np.asarray(trajectory.slip[0] + trajectory.constants[3:5])
+    in_body = np.array([np.cos(pitch) * np.cos(yaw), -np.cos(pitch) * np.sin(yaw), -np.sin(pitch)])
+    C = np.asarray(euler_to_matrix(jnp.array([bank, 0.2, 2.0])))
+    v = 15.0 * C @ in_body + np.append(trajectory.constants[5:7], 0.0)
+    trajectory = replace(
+        trajectory,
+        C_nb=jnp.stack([jnp.asarray(C)] * 2),
+        v_n=jnp.stack([jnp.asarray(v)] * 2),
+        slip=jnp.stack([trajectory.slip[0]] * 2),
+    )
+    z, _, _ = motion_measurements(trajectory, trajectory.v_n, jnp.ones((2, 3)), jnp.full(2, 0.01), jnp.zeros(2))
+    np.testing.assert_allclose(z[:, 3:], 0, atol=1e-12)

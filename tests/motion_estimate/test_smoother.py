@@ -19,7 +19,7 @@ from altijax.rotations import euler_to_matrix, matrix_to_rotvec
 
 GRAVITY, RATE = 9.80665, 25.0
 NOISE = MotionNoise(rotation=0.01, acceleration=0.05, gyro_walk=1e-6, accelerometer_walk=1e-6)
-STD = [2.0] * 3 + [100.0] * 3 + [0.05] * 3 + [0.03] * 3 + [0.0] * 6
+STD = [2.0] * 3 + [100.0] * 3 + [0.05] * 3 + [0.03] * 3 + [0.0] * 10
 
 
 def truth(t: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
