@@ -42,6 +42,8 @@ _ACCELEROMETER_SCALE_STD = 0.015
 # What no record tells: the IMU's axes are at right angles, and those of both sensors the body's, to so many radians.
 _AXES_STD = 0.01
 _RATE_STD = 0.3  # of the vehicle's own turning, without a gyro, rad/s
+# Without a gyro turning passes for even between instants, but small aircraft roll there and back within a second.
+_LONGEST_EVEN_TURN = 0.5  # s
 _MOUNT_STD, _WIND_STD = 0.1, 10.0
 # Heights are the weakest direction of GNSS, and receivers smooth the climb more than the rest: how much later it is, s.
 _CLIMB_DELAY_STD = 0.1
@@ -279,12 +281,13 @@ def _first_batch(
     course = not use_gyro or wind != "auto"
     delay_prior = beliefs.delay or (_DELAY, _DELAY_STD)
     covariance = _prior_covariance(recording, use_gyro, course, wind is True, delay is None, beliefs)
+    longest = 1.0 if use_gyro else _LONGEST_EVEN_TURN
     search = delay is None and not use_gyro and beliefs.delay is None
     delays = _DELAYS_WITHOUT_GYRO if search else (first,)
     turns = (0.0, 0.5, 1.0, 1.5) if use_gyro else (0.0,)
     best: tuple[_Batch, MotionReadings, int] | None = None
     for trial in delays:
-        readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=trial)
+        readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=trial, longest=longest)
         prior = MotionPrior(
             covariance=jnp.asarray(covariance),
             doubt=jnp.ones_like(readings.std),

@@ -14,7 +14,9 @@ _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e
 _SAMPLES, _INSTANTS, _STEPS = 2048, 64, 8
 
 
-def motion_readings(recording: Recording, *, use_gyro: bool, delay: float) -> tuple[MotionReadings, int]:
+def motion_readings(
+    recording: Recording, *, use_gyro: bool, delay: float, longest: float = 1.0
+) -> tuple[MotionReadings, int]:
     """Arrays of a recording; call it in double precision (`jax.enable_x64`).
 
     Parameters
@@ -25,6 +27,8 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float) -> tu
         Whether the rates are taken; they are zero otherwise.
     delay : float
         About how late the receiver's stamps are, in s; it decides which epochs the IMU covers.
+    longest : float
+        About how long intervals between instants may be, in s, whatever the time between epochs.
 
     Returns
     -------
@@ -62,7 +66,7 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float) -> tu
         )
     epochs, velocity, std = epochs[inside], velocity[inside], std[inside]
     spacing = float(np.clip(np.median(np.diff(epochs)), usual, 1.0))
-    instant, row = _with_instants_between(epochs, t[-1] + delay, delay, spacing)
+    instant, row = _with_instants_between(epochs, t[-1] + delay, delay, min(spacing, longest))
     delayed = np.ones(instant.size)
     # What lies before the first and after the last epoch stands on the IMU's clock.
     before, after = instant < epochs[0], instant > epochs[-1]
@@ -109,16 +113,16 @@ def _epochs(recording: Recording, start: float) -> tuple[np.ndarray, np.ndarray,
 
 
 def _with_instants_between(
-    epochs: np.ndarray, end: float, begin: float, spacing: float
+    epochs: np.ndarray, end: float, begin: float, longest: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The epochs, and instants that leave no interval longer than about `spacing`; the row of each, -1 for those."""
+    """The epochs, and instants that leave no interval longer than about `longest`; the row of each, -1 for those."""
     first = [begin] if epochs[0] - begin > 1e-6 else []
     last = [end] if end - epochs[-1] > 1e-6 else []
     known = np.concatenate([first, epochs, last])
     rows = np.concatenate([[-1] * len(first), np.arange(epochs.size), [-1] * len(last)]).astype(int)
     instants, chosen = [known[:1]], [rows[:1]]
     for a, b, row in zip(known[:-1], known[1:], rows[1:], strict=True):
-        parts = max(1, int(np.ceil((b - a) / spacing - 0.5)))
+        parts = max(1, int(np.ceil((b - a) / longest - 0.5)))
         instants.append(np.linspace(a, b, parts + 1)[1:])
         chosen.append(np.append(np.full(parts - 1, -1), row))
     return np.concatenate(instants), np.concatenate(chosen)

@@ -32,6 +32,15 @@ def test_stated_accuracies_are_used_and_missing_ones_filled() -> None:
     assert not np.asarray(readings.readings)[:, 3:6].any()
 
 
+def test_instants_between_epochs_keep_intervals_short() -> None:
+    readings, _ = motion_readings(made(), use_gyro=False, delay=0.1, longest=0.5)
+    instants = np.asarray(readings.instant)
+    there = np.isfinite(np.asarray(readings.std)[:, 0])
+    np.testing.assert_allclose(instants[there], np.arange(1.0, 11.0))
+    inner = (instants >= 1.0) & (instants <= 10.0) & (np.asarray(readings.delayed) > 0)
+    np.testing.assert_allclose(instants[inner], np.arange(1.0, 10.1, 0.5))
+
+
 def test_streams_that_do_not_meet_are_named() -> None:
     with pytest.raises(ValueError, match="'made': 2 GNSS velocities lie within"):
         motion_readings(made(), use_gyro=True, delay=-10.5)
