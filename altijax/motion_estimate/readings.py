@@ -27,7 +27,7 @@ def motion_readings(
         Whether the rates are taken; they are zero otherwise.
     delay : float
         About how late the receiver's stamps are, in s; it decides which epochs the IMU covers.
-    longest : float
+    longest : float, optional
         About how long intervals between instants may be, in s, whatever the time between epochs.
 
     Returns
