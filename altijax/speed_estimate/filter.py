@@ -92,13 +92,12 @@ def filter_speed(
 
     The readings are means over steps that are short against the car's manoeuvres and long against its vibration: 0.2 s
     serves. With four or five sensors ``pitch' = -w_y cos(roll) + w_z sin(roll)`` and ``v' = f_x - g sin(pitch)``, as in
-    [us20060293826]_; ``f_y = w_z v + g cos(pitch) sin(roll)`` is measured with noise. Without a roll gyro the car is
-    taken to turn about its own upright axis, which on a slope exchanges pitch for roll, and the rest of the roll to
-    wander about a mean. With six sensors the IMU's velocity is carried along its own axes, and the point that does not
-    slip has neither lateral nor vertical speed. Of the aid only the speed is used. A measurement beyond 3 standard
-    deviations counts as one of a larger error. Where the vehicle stands, its speed and rates are zero. Where the aid
-    has shown that the vehicle shakes the more the faster it is, the vibration, in means of five steps, is a measurement
-    of the speed.
+    [us20060293826]_; ``f_y = w_z v + g cos(pitch) sin(roll)`` is measured with noise. Without a roll gyro the roll is
+    taken to wander about a mean, that of the road's cant, also where a road turns on a slope. With six sensors the
+    IMU's velocity is carried along its own axes, and the point that does not slip has neither lateral nor vertical
+    speed. Of the aid only the speed is used. A measurement beyond 3 standard deviations counts as one of a larger
+    error. Where the vehicle stands, its speed and rates are zero. Where the aid has shown that the vehicle shakes the
+    more the faster it is, the vibration, in means of five steps, is a measurement of the speed.
 
     Parameters
     ----------

@@ -203,9 +203,9 @@ def _corrected(x: States, step: Step) -> tuple[jax.Array, jax.Array, jax.Array]:
     return w_x, w_y, w_z
 
 
-def _tangent(pitch: jax.Array) -> jax.Array:
-    """Bounded: no car is steeper, and at the poles the roll has no rate."""
-    return jnp.tan(jnp.clip(pitch, -_STEEPEST, _STEEPEST))
+def _roll_kept(pitch: jax.Array, roll: jax.Array, w_y: jax.Array, w_z: jax.Array) -> jax.Array:
+    """The w_x that keeps the roll. The pitch is bounded: no car is steeper, and at the poles the roll has no rate."""
+    return jnp.tan(jnp.clip(pitch, -_STEEPEST, _STEEPEST)) * (w_y * jnp.sin(roll) + w_z * jnp.cos(roll))
 
 
 def _travel(x: States) -> tuple[jax.Array, jax.Array, jax.Array]:
@@ -230,13 +230,10 @@ def _rates(x: States, step: Step, gravity: jax.Array, noise: SpeedNoise) -> Stat
     # f = v' u + w x v u + gravity + the lever's centripetal force, solved for v'
     force = step.f_b[0] - x["accelerometer_bias_x"] - gravity * jnp.sin(pitch)
     acceleration = (force - x["speed"] * (w_y * u_z - w_z * u_y) + (w_y * w_y + w_z * w_z) * x["lever_x"]) / u_x
-    turn = w_y * jnp.sin(roll) + w_z * jnp.cos(roll)
     if "resting_roll" in x:
-        # a car on a plane turns about its upright axis: seen from the IMU, w_x = -w_z u_z / u_x
-        towards_mean = (x["resting_roll"] - x["roll"]) / noise.road_roll_time
-        roll_rate = -w_z * u_z / u_x - _tangent(pitch) * turn + towards_mean
+        roll_rate = (x["resting_roll"] - x["roll"]) / noise.road_roll_time
     else:
-        roll_rate = w_x - _tangent(pitch) * turn
+        roll_rate = w_x - _roll_kept(pitch, roll, w_y, w_z)
     return {
         "speed": acceleration,
         "pitch": -w_y * jnp.cos(roll) + w_z * jnp.sin(roll),
@@ -247,11 +244,13 @@ def _rates(x: States, step: Step, gravity: jax.Array, noise: SpeedNoise) -> Stat
 
 def _expected(x: States, middle: States, rate: States, step: Step, gravity: jax.Array) -> list[jax.Array]:
     """What `measurements` should be with two accelerometers."""
-    _, _, w_z = _corrected(middle, step)
+    w_x, w_y, w_z = _corrected(middle, step)
     u_x, u_y, u_z = _travel(x)
-    w_x = step.w_b[0] - x["gyro_bias_x"] if "gyro_bias_x" in x else -w_z * u_z / u_x
+    roll = total_roll(middle, step)
+    if "gyro_bias_x" not in x:
+        w_x = _roll_kept(middle["pitch"], roll, w_y, w_z)
     f_y = rate["speed"] * u_y + middle["speed"] * (w_z * u_x - w_x * u_z) + x["accelerometer_bias_y"]
-    f_y += gravity * jnp.cos(middle["pitch"]) * jnp.sin(total_roll(middle, step)) + step.w_dot[2] * x["lever_x"]
+    f_y += gravity * jnp.cos(middle["pitch"]) * jnp.sin(roll) + step.w_dot[2] * x["lever_x"]
     if "lever_z" in x:
         f_y -= step.w_dot[0] * x["lever_z"]
     return [f_y, _at_aid(x, x["speed"], step), x["speed"], _shaking(x, x["speed"]), *_rates_at_rest(x, step)]
@@ -265,13 +264,12 @@ def _rates_of_six(x: States, step: Step, gravity: jax.Array, noise: SpeedNoise) 
     up = jnp.stack([jnp.sin(pitch), jnp.cos(pitch) * jnp.sin(roll), jnp.cos(pitch) * jnp.cos(roll)])
     velocity = jnp.stack([x["speed"], x["lateral_speed"], x["vertical_speed"]])
     a = step.f_b - bias - gravity * up - jnp.cross(w, velocity)
-    turn = w[1] * jnp.sin(roll) + w[2] * jnp.cos(roll)
     return {
         "speed": a[0],
         "lateral_speed": a[1],
         "vertical_speed": a[2],
         "pitch": -w[1] * jnp.cos(roll) + w[2] * jnp.sin(roll),
-        "roll": w[0] - _tangent(pitch) * turn,
+        "roll": w[0] - _roll_kept(pitch, roll, w[1], w[2]),
         "roughness": -x["roughness"] / _ROUGHNESS_TIME,
     }
 

@@ -1,5 +1,6 @@
 """The model of the speed filter against exact motions: rates by differentiation, readings by `ideal_readings`."""
 
+from dataclasses import replace
 from functools import cache
 
 import jax
@@ -14,6 +15,7 @@ from altijax.speed_estimate.model import SENSORS, STATES, SpeedNoise, Step, meas
 
 G = 9.81
 ROAD = winding_road([0.5, 0.3], [210.0, 97.0], [0.4, 2.0], [0.06, 0.04], [170.0, 83.0], [0.0, 1.0], 4.0)
+WITHOUT_CANT = replace(ROAD, cant=jnp.zeros_like(ROAD.cant))
 PROFILE = SpeedProfile(
     start=jnp.array([1.0]),
     stop=jnp.array([60.0]),
@@ -24,21 +26,23 @@ PROFILE = SpeedProfile(
     phase=jnp.array([0.7]),
 )
 # Roll, pitch, yaw of the IMU on the car; where it lies, along its own x axis.
-MOUNTING, LEVER = jnp.array([0.04, -0.1, -0.08]), 0.7
+MOUNTING, LEVER = (0.04, -0.1, -0.08), 0.7
 TIMES = jnp.linspace(8.0, 40.0, 7)
 
 
 @cache
-def motion(lever: float) -> tuple[Readings, jax.Array, jax.Array]:
+def motion(
+    lever: float, mounting: tuple[float, float, float] = MOUNTING, canted: bool = True
+) -> tuple[Readings, jax.Array, jax.Array]:
     """Readings of the IMU, the vehicle's speed, and the exact rates of speed, pitch and roll (time, 3)."""
-    C_vb = euler_to_matrix(MOUNTING)
+    C_vb, road = euler_to_matrix(jnp.array(mounting)), ROAD if canted else WITHOUT_CANT
 
     def pose(t: jax.Array) -> tuple[jax.Array, jax.Array]:
-        position, C_nv = road_pose(ROAD, PROFILE, t)
+        position, C_nv = road_pose(road, PROFILE, t)
         return position + C_nv @ C_vb[:, 0] * lever, C_nv @ C_vb
 
     def quantities(t: jax.Array) -> jax.Array:
-        velocity = jax.jvp(lambda t: road_pose(ROAD, PROFILE, t)[0], (t,), (1.0,))[1]
+        velocity = jax.jvp(lambda t: road_pose(road, PROFILE, t)[0], (t,), (1.0,))[1]
         _, C_nb = pose(t)
         roll, pitch, _ = matrix_to_euler(C_nb)
         return jnp.stack([jnp.linalg.norm(velocity), pitch, roll])
@@ -71,7 +75,7 @@ def states_at(i: int, lever: float, sensors: str) -> dict[str, jax.Array]:
     """The true states, all constants those of error-free sensors."""
     readings, found, _ = motion(lever)
     x = dict.fromkeys(state_names(sensors), jnp.zeros(()))
-    forward = euler_to_matrix(MOUNTING)[0]
+    forward = euler_to_matrix(jnp.array(MOUNTING))[0]
     x |= {"speed": found[i, 0], "pitch": found[i, 1], "roll": found[i, 2], "lever_x": jnp.asarray(lever)}
     if sensors == "6":
         v_b = readings.C_nb[i].T @ readings.velocity[i]
@@ -107,9 +111,22 @@ def test_measurements_are_what_is_expected_of_the_true_states(sensors: str) -> N
         expected = model.expected(x, x, rates, step, G)
         measured = [value for value, _, _ in measurements(step, SpeedNoise(), sensors, jnp.array(True))]
         assert len(expected) == len(measured)
-        # without a roll gyro w_x is that of a turn about the car's upright axis
+        # without a roll gyro w_x is a guess
         checked = {"2+2": 0, "2+3": 1, "6": 2}[sensors]
         np.testing.assert_allclose(expected[:checked], measured[:checked], atol=1e-9)
+
+
+def test_without_a_roll_gyro_the_lateral_reading_is_that_of_a_car_that_keeps_its_roll() -> None:
+    """On a road without cant that climbs and winds, whatever the IMU's pitch on the car."""
+    readings, found, _ = motion(0.0, (0.0, 0.2, 0.0), canted=False)
+    model = model_of("2+2")
+    for i in range(TIMES.size):
+        x = dict.fromkeys(state_names("2+2"), jnp.zeros(()))
+        x |= {"speed": found[i, 0], "pitch": found[i, 1], "roll": found[i, 2], "travel_pitch": jnp.asarray(-0.2)}
+        step = step_of(readings, i)
+        rates = model.rates(x, step, G, SpeedNoise())
+        assert rates["roll"] == pytest.approx(0.0, abs=1e-9)
+        assert model.expected(x, x, rates, step, G)[0] == pytest.approx(float(readings.f_b[i, 1]), abs=1e-9)
 
 
 def test_states_are_named_in_order() -> None:
