@@ -81,7 +81,7 @@ def test_turning_tells_the_speed_and_going_straight_does_not() -> None:
     curves = run(**made | {"speed0": made["speed0"] + 1.0})
     straight = run(**made | {"w_b": np.zeros((N, 3)), "f_b": np.tile([0.0, 0.0, GRAVITY], (N, 1))})
     assert jnp.max(jnp.abs(curves.speed - made["aid_speed"])[200:]) < 1.5
-    assert jnp.max(curves.speed_std[200:]) < 1.2 and jnp.min(straight.speed_std[200:]) > 50
+    assert jnp.max(curves.speed_std[200:]) < 2 and jnp.min(straight.speed_std[200:]) > 50
 
 
 @pytest.mark.parametrize("phase", [0, 3])
