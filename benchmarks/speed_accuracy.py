@@ -136,7 +136,7 @@ def made_up_drive(seed: int) -> Recording:
     f, w = (np.array(recorded[name]) for name in "fw")
     # a rougher road shakes more, a rate that shakes shows a bias
     speed = np.asarray(truth.speed)
-    rough = np.exp(0.4 * lasting(rng, speed.size, RATE * 25.0)) * (0.1 + (speed / 10) ** 0.7)
+    rough = np.exp(0.4 * lasting(rng, speed.size, RATE * 25.0)) * (0.1 + (np.abs(speed) / 10) ** 0.7)
     shaking = SHAKING * rough[:, None]
     w += shaking * _vibration(rng, w.shape)
     w[:, 1] += 0.05 * rng.normal() * shaking[:, 1] ** 2
