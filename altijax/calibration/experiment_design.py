@@ -33,7 +33,7 @@ CHANGES = {
 }
 """By how much a driver can change each of `Manoeuvres` without trouble (assumed), and how one says it."""
 
-_STEPS = 4 * STEPS_OF_INTERVAL
+_STEPS = 5 * STEPS_OF_INTERVAL
 
 
 def drive_information(
