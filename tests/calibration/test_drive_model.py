@@ -19,31 +19,10 @@ from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, tow
 from altijax.doppler import DopplerReceiver
 from altijax.rotations import euler_to_matrix
 from altijax.sensors import Accelerometer, Gyro
+from tests.calibration.planted import planted
 
 GRAVITY, STEPS, FINE = 9.80665, 200, 10
-TRUTH = np.array(
-    [
-        1.01,
-        -0.03,
-        0.16,
-        0.1,
-        -0.2,
-        0.05,
-        1.005,
-        0.002,
-        -0.003,
-        0.004,
-        0.05,
-        -0.02,
-        1.004,
-        0.05,
-        0.001,
-        1.2,
-        -0.4,
-        0.01,
-        1.6,
-    ]
-)
+TRUTH = planted()
 P = dict(zip(DRIVE_PARAMETERS, TRUTH, strict=True))
 START = 8.0  # under way, so that the first velocity is not zero
 solve = jax.jit(drive_residuals)

@@ -14,29 +14,12 @@ from altijax.doppler import DopplerReceiver
 from altijax.instruments import MEMS_ACCELEROMETER, MEMS_GYRO
 from altijax.recordings import read_recording
 from altijax.sensors import Accelerometer, Gyro
+from tests.calibration.planted import planted
 
-TRUTH = np.array(
-    [
-        1.013,
-        -0.03,
-        0.16,
-        0.2,
-        -0.15,
-        0.1,
-        0.996,
-        0.004,
-        -0.006,
-        0.005,
-        0.06,
-        -0.03,
-        1.004,
-        0.05,
-        0.001,
-        1.2,
-        -0.4,
-        0.01,
-        1.6,
-    ]
+TRUTH = planted(
+    **{"wheel_scale": 1.013, "accelerometer_scale": 0.996, "mounting_pitch": 0.06, "mounting_yaw": -0.03},
+    **{"accelerometer_bias_x": 0.2, "accelerometer_bias_y": -0.15, "accelerometer_bias_z": 0.1},
+    **{"gyro_bias_x": 0.004, "gyro_bias_y": -0.006, "gyro_bias_z": 0.005},
 )
 DENSITY = {"gyro": float(MEMS_GYRO.noise_density), "accelerometer": float(MEMS_ACCELEROMETER.noise_density)}
 DENSITY["receiver"] = 0.0

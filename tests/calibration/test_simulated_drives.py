@@ -9,6 +9,7 @@ from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, tow
 from altijax.doppler import DopplerReceiver
 from altijax.rotations import euler_to_matrix
 from altijax.sensors import Accelerometer, Gyro
+from tests.calibration.planted import planted
 
 T = jnp.arange(1301) * 0.1
 READINGS = jax.jit(lambda t: town_drive(Manoeuvres(), t, 9.81, legs=2))(T)
@@ -23,28 +24,14 @@ def test_drive_stops_turns_and_climbs() -> None:
 
 
 def test_recorded_readings_are_the_ideal_ones_through_the_parameters() -> None:
-    truth = np.array(
-        [
-            1.02,
-            0.1,
-            0.2,
-            0.1,
-            -0.2,
-            0.05,
-            1.005,
-            0.002,
-            -0.003,
-            0.004,
-            0.05,
-            -0.02,
-            1.004,
-            0.0,
-            0.0,
-            0.0,
-            0.0,
-            0.01,
-            1.6,
-        ]
+    truth = planted(
+        wheel_scale=1.02,
+        wheel_delay=0.1,
+        gnss_delay=0.2,
+        weight_transfer=0,
+        wheel_slip=0,
+        lever_arm=0,
+        antenna_lever_arm=0,
     )
     recorded = recorded_drive(
         READINGS,
