@@ -50,6 +50,7 @@ References
 [chalko2010]     Chalko: Combining accelerations and GPS-Doppler velocities. 2010.
 """
 
+import os
 from importlib import import_module
 from typing import TYPE_CHECKING
 
@@ -277,6 +278,10 @@ if TYPE_CHECKING:
         plot_elevation_error,
         plot_streams,
     )
+    from altijax.programs import (
+        count_programs,
+        keep_programs,
+    )
     from altijax.recordings import (
         Recording,
         RecordingError,
@@ -287,6 +292,8 @@ if TYPE_CHECKING:
 
 # Files and tables need pandas, pictures matplotlib: both are imported on first use only.
 _LAZY = {
+    "count_programs": "programs",
+    "keep_programs": "programs",
     "Recording": "recordings",
     "RecordingError": "recordings",
     "RecordingWarning": "recordings",
@@ -359,6 +366,7 @@ __all__ = [
     "correct_accelerometer",
     "correct_gyro",
     "correct_wheel_speeds",
+    "count_programs",
     "course_attitude",
     "course_to_velocity",
     "coverage",
@@ -410,6 +418,7 @@ __all__ = [
     "integrate_velocity",
     "interpolate_rotations",
     "interval_means",
+    "keep_programs",
     "levenberg_marquardt",
     "list_datasets",
     "load_dataset",
@@ -489,3 +498,8 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return __all__
+
+
+# Only where the user has said so by the environment: otherwise importing altijax leaves jax's configuration alone.
+if os.environ.get("ALTIJAX_KEEP_PROGRAMS"):
+    import_module("altijax.programs").keep_programs_as_told()

@@ -1,0 +1,78 @@
+"""Sampled series in NumPy: what reading and aligning a recording needs, where nothing is differentiated or compiled.
+
+`signals` has the same for JAX.
+"""
+
+import numpy as np
+
+
+def interpolated(t: np.ndarray, t_samples: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Samples at other times by straight lines, the first and last one held beyond them.
+
+    Parameters
+    ----------
+    t : (time,) s
+        Times asked for.
+    t_samples : (samples,) s
+        Times of the samples, not decreasing.
+    values : (samples,) or (samples, columns)
+        Samples.
+
+    Returns
+    -------
+    values : (time,) or (time, columns)
+        Of the same unit.
+    """
+    if values.ndim == 1:
+        return np.interp(t, t_samples, values)
+    return np.stack([np.interp(t, t_samples, column) for column in values.T], -1)
+
+
+def supported(t: np.ndarray, t_samples: np.ndarray, max_gap: float) -> np.ndarray:
+    """Where samples support a value: on one, or between two that are near each other.
+
+    Parameters
+    ----------
+    t : (time,) s
+        Times asked for.
+    t_samples : (samples,) s
+        Times of the samples, not decreasing.
+    max_gap : float
+        Longest interval between neighbouring samples that may be bridged, s.
+
+    Returns
+    -------
+    supported : (time,)
+        True where it is so.
+    """
+    last = t_samples.size - 1
+    after = np.clip(np.searchsorted(t_samples, t, side="left"), min(1, last), last)
+    before = np.maximum(after - 1, 0)
+    on_sample = (t == t_samples[before]) | (t == t_samples[after])
+    between = (t >= t_samples[0]) & (t <= t_samples[-1]) & (t_samples[after] - t_samples[before] <= max_gap)
+    return on_sample | between
+
+
+def means_between(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Means over intervals of samples, the trapezoid between two neighbours spread evenly over the time between them.
+
+    Exact where the edges are times of samples; `signals.interval_means` is so everywhere.
+
+    Parameters
+    ----------
+    edges : (..., edges) s
+        Ends of the intervals, increasing along the last axis, within the span of the samples.
+    t : (samples,) s
+        Times of the samples, increasing.
+    values : (samples, columns)
+        Samples.
+
+    Returns
+    -------
+    means : (..., edges - 1, columns)
+        Of the same unit.
+    """
+    areas = 0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, None]
+    integral = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(areas, 0)])
+    at_edges = np.stack([np.interp(edges, t, column) for column in integral.T], -1)
+    return np.diff(at_edges, axis=-2) / np.diff(edges)[..., None]

@@ -1,0 +1,149 @@
+"""Signs of life: what a long piece of work is doing, shown once it has taken two seconds, and written to the log."""
+
+import logging
+import threading
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
+from typing import Any, TypeVar
+
+import jax
+
+from altijax.programs import COMPILATION, count_programs
+
+Item = TypeVar("Item")
+
+logger = logging.getLogger("altijax")
+
+_SILENT = 2.0  # s
+
+
+class Stages:
+    """What is going on inside one piece of work: the stage it is at, and how many of its items are done."""
+
+    def __init__(self, title: str, total: int | None, bar: "_Bar") -> None:
+        self._title, self._total, self._bar = title, total, bar
+        self._done = 0
+
+    def __call__(self, stage: str) -> None:
+        """Say that a stage begins."""
+        logger.debug("%s: %s", self._title, stage)
+        self._bar.show(f"{self._title}: {stage}")
+
+    def advance(self) -> None:
+        """Say that one of the items is done."""
+        self._done += 1
+        of = "" if self._total is None else f" {self._done}/{self._total}"
+        self._bar.show(self._title + of)
+
+
+class _Bar:
+    """A progress bar of tqdm that comes into being when the work has taken a while."""
+
+    def __init__(self) -> None:
+        self._stage, self._compiling = "", ""
+        self._shown: Any = None
+        self._lock = threading.Lock()
+        self._timer = threading.Timer(_SILENT, self._appear)
+        self._timer.daemon = True
+        self._timer.start()
+
+    def show(self, stage: str) -> None:
+        self._stage = stage
+        self._refresh()
+
+    def compiling(self, what: str) -> None:
+        """Name of the program that is being compiled; empty when it is done."""
+        self._compiling = f", compiling {what}" if what else ""
+        self._refresh()
+
+    def close(self) -> None:
+        self._timer.cancel()
+        with self._lock:
+            if self._shown is not None:
+                self._shown.close()
+
+    def _appear(self) -> None:
+        from tqdm.auto import tqdm  # importing it takes as long as a short estimate
+
+        with self._lock:
+            self._shown = tqdm(bar_format="{desc} [{elapsed}]", leave=False)
+        self._refresh()
+
+    def _refresh(self) -> None:
+        with self._lock:
+            if self._shown is not None:
+                self._shown.set_description_str(self._stage + self._compiling)
+
+
+_BAR: ContextVar[_Bar | None] = ContextVar("altijax_bar", default=None)
+
+
+@contextmanager
+def stages(title: str, total: int | None = None) -> Iterator[Stages]:
+    """Show what a piece of work is doing from two seconds on, compiling included; work inside it shows there too.
+
+    Parameters
+    ----------
+    title : str
+        What is being done, as "slope of comma2k19".
+    total : int, optional
+        Number of items, as rounds or recordings.
+
+    Yields
+    ------
+    stage : callable
+        ``stage("noise levels")`` says which stage begins, ``stage.advance()`` that one of the items is done.
+    """
+    outer = _BAR.get()
+    if outer is not None:
+        yield Stages(title, total, outer)
+        return
+    bar = _Bar()
+    bar.show(title)
+
+    def begins(event: str, _: float, **details: object) -> None:
+        if event == COMPILATION:
+            bar.compiling(str(details.get("fun_name", "a program")))
+
+    def ends(event: str, _: float, **__: object) -> None:
+        if event == COMPILATION:
+            bar.compiling("")
+
+    jax.monitoring.register_scalar_listener(begins)
+    jax.monitoring.register_event_duration_secs_listener(ends)
+    token, began = _BAR.set(bar), time.perf_counter()
+    try:
+        with count_programs() as programs:
+            yield Stages(title, total, bar)
+        logger.info(
+            "%s: %.1f s; %d program(s) compiled in %.1f s, %d of them kept ones loaded",
+            *(title, time.perf_counter() - began, programs.number, programs.seconds, programs.loaded),
+        )
+    finally:
+        _BAR.reset(token)
+        jax.monitoring.unregister_scalar_listener(begins)
+        jax.monitoring.unregister_event_duration_listener(ends)
+        bar.close()
+
+
+def tracked(items: Sequence[Item], title: str) -> Iterator[Item]:
+    """The items one by one, with the number of those done shown while they are worked on.
+
+    Parameters
+    ----------
+    items : sequence
+        Such as outages or recordings.
+    title : str
+        What is being done with them.
+
+    Yields
+    ------
+    item
+        Each of them.
+    """
+    with stages(title, len(items)) as stage:
+        for item in items:
+            yield item
+            stage.advance()
