@@ -1,5 +1,6 @@
 """From a recording to arrays: the IMU on a uniform grid, the speed, gravity, and the reference to judge by."""
 
+import math
 import warnings
 from dataclasses import dataclass
 
@@ -9,7 +10,7 @@ import numpy as np
 import pandas as pd
 
 from altijax.constants import STANDARD_GRAVITY
-from altijax.earth import normal_gravity
+from altijax.earth import gravity_of
 from altijax.recordings import Recording
 from altijax.signals import resample
 from altijax.wheels import WheelSensor, yaw_rate_from_wheels
@@ -168,8 +169,7 @@ def gravity_at(recording: Recording) -> float:
         height = float(gnss["alt"].mean())
     if latitude is None:
         return STANDARD_GRAVITY
-    with jax.enable_x64(True):
-        return float(normal_gravity(latitude, 0.0 if height is None else height))
+    return gravity_of(math.sin(latitude) ** 2, 0.0 if height is None else height)
 
 
 def _yaw_rate(recording: Recording, t: np.ndarray) -> jax.Array:

@@ -1,5 +1,7 @@
 """The Earth as WGS 84 has it: normal gravity, and geodetic, Earth-centred and local East-North-Up coordinates."""
 
+from typing import Any
+
 import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
@@ -40,10 +42,27 @@ def normal_gravity(latitude: ArrayLike, height: ArrayLike) -> jax.Array:
     """
     latitude = require_shape("latitude", latitude, (...,))
     height = require_shape("height", height, (...,))
-    sin2 = jnp.sin(latitude) ** 2
+    return gravity_of(jnp.sin(latitude) ** 2, height)
+
+
+def gravity_of(sin2: Any, height: Any) -> Any:
+    """The formula of `normal_gravity` for arrays of any library, and for plain numbers, which compile nothing.
+
+    Parameters
+    ----------
+    sin2 : (...)
+        Squared sine of the latitude.
+    height : (...) m
+        Height above the ellipsoid.
+
+    Returns
+    -------
+    gravity : (...) m/s^2
+        Magnitude of normal gravity.
+    """
     k = _B * WGS84_POLAR_GRAVITY / (_A * WGS84_EQUATORIAL_GRAVITY) - 1
     m = EARTH_ROTATION_RATE**2 * _A**2 * _B / WGS84_GRAVITATIONAL_PARAMETER
-    on_ellipsoid = WGS84_EQUATORIAL_GRAVITY * (1 + k * sin2) / jnp.sqrt(1 - _E2 * sin2)
+    on_ellipsoid = WGS84_EQUATORIAL_GRAVITY * (1 + k * sin2) / (1 - _E2 * sin2) ** 0.5
     x = height / _A
     return on_ellipsoid * (1 - 2 * (1 + WGS84_FLATTENING + m - 2 * WGS84_FLATTENING * sin2) * x + 3 * x * x)
 

@@ -98,12 +98,12 @@ def count_programs() -> Iterator[Programs]:
     """
     found = Programs()
 
-    def compiled(event: str, seconds: float, **details: object) -> None:
+    def compiled(event: str, duration_secs: float, **kwargs: str | int) -> None:
         if event == COMPILATION:
-            found.names.append(str(details.get("fun_name", "")))
-            found.seconds += seconds
+            found.names.append(str(kwargs.get("fun_name", "")))
+            found.seconds += duration_secs
 
-    def loaded(event: str, **_: object) -> None:
+    def loaded(event: str, **kwargs: str | int) -> None:
         found.loaded += event == _LOADED
 
     jax.monitoring.register_event_duration_secs_listener(compiled)

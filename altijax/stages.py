@@ -103,11 +103,11 @@ def stages(title: str, total: int | None = None) -> Iterator[Stages]:
     bar = _Bar()
     bar.show(title)
 
-    def begins(event: str, _: float, **details: object) -> None:
+    def begins(event: str, value: float, **kwargs: str | int) -> None:
         if event == COMPILATION:
-            bar.compiling(str(details.get("fun_name", "a program")))
+            bar.compiling(str(kwargs.get("fun_name", "a program")))
 
-    def ends(event: str, _: float, **__: object) -> None:
+    def ends(event: str, duration_secs: float, **kwargs: str | int) -> None:
         if event == COMPILATION:
             bar.compiling("")
 
