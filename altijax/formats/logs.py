@@ -9,13 +9,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-import jax
 import numpy as np
 import pandas as pd
+from pymap3d import ecef2enuv, ecef2geodetic
+from scipy.spatial.transform import Rotation
 
-from altijax.earth import ecef_to_geodetic, enu_axes
 from altijax.formats.stream_checks import RecordingError
-from altijax.rotations import matrix_to_euler, quaternion_to_matrix, yaw_to_heading
 
 Log = tuple[dict[str, pd.DataFrame], dict[str, Any]]
 
@@ -218,12 +217,11 @@ def _matching(
 def _comma2k19_reference(
     t: np.ndarray, positions: np.ndarray, velocities: np.ndarray, orientations: np.ndarray
 ) -> pd.DataFrame:
-    with jax.enable_x64(True):
-        geodetic = np.asarray(ecef_to_geodetic(positions))
-        C_ne = np.asarray(enu_axes(geodetic))
-        C_nb = C_ne @ np.asarray(quaternion_to_matrix(orientations)) @ _DOWN_TO_UP
+    lat, lon, alt = ecef2geodetic(*positions.T)
+    C_ne = np.stack([ecef2enuv(*axis, lat, lon) for axis in np.eye(3)], -1).swapaxes(0, 1)
+    C_nb = C_ne @ _matrices(orientations) @ _DOWN_TO_UP
     columns = _attitude(C_nb) | dict(zip(_VELOCITY, np.einsum("tij,tj->it", C_ne, velocities), strict=True))
-    columns |= {"lat": np.degrees(geodetic[:, 0]), "lon": np.degrees(geodetic[:, 1]), "alt": geodetic[:, 2]}
+    columns |= {"lat": lat, "lon": lon, "alt": alt}
     return stream_table(t, np.stack(list(columns.values()), -1), list(columns), "global_pose")
 
 
@@ -261,9 +259,7 @@ def _ulog_reference(topics: dict[str, dict[str, np.ndarray]], file: str, notes: 
     attitude, position = topics.get("vehicle_attitude"), topics.get("vehicle_local_position")
     if attitude:
         quaternion = np.stack([attitude[f"q[{k}]"] for k in range(4)], -1).astype(float)
-        with jax.enable_x64(True):
-            C_nb = _NED_TO_ENU @ np.asarray(quaternion_to_matrix(quaternion)) @ _DOWN_TO_UP
-        columns = _attitude(C_nb)
+        columns = _attitude(_NED_TO_ENU @ _matrices(quaternion) @ _DOWN_TO_UP)
         tables.append(
             stream_table(
                 _sampled(attitude), np.stack(list(columns.values()), -1), list(columns), f"{file} vehicle_attitude"
@@ -292,7 +288,18 @@ def _sampled(topic: dict[str, np.ndarray]) -> np.ndarray:
     return topic.get("timestamp_sample", topic["timestamp"]).astype(np.int64) * 1e-6
 
 
+def _matrices(quaternions: np.ndarray) -> np.ndarray:
+    """Rotations (time, 3, 3) of quaternions (time, 4), scalar first; NaN where a quaternion is none."""
+    matrices = np.full((len(quaternions), 3, 3), np.nan)
+    usable = np.isfinite(quaternions).all(1) & quaternions.any(1)
+    matrices[usable] = Rotation.from_quat(quaternions[usable], scalar_first=True).as_matrix()
+    return matrices
+
+
 def _attitude(C_nb: np.ndarray) -> dict[str, np.ndarray]:
-    with jax.enable_x64(True):
-        roll, pitch, yaw = np.asarray(matrix_to_euler(C_nb)).T
-        return {"roll": roll, "pitch": pitch, "heading": np.asarray(yaw_to_heading(yaw))}
+    yaw = np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0])
+    return {
+        "roll": np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]),
+        "pitch": np.arcsin(np.clip(C_nb[:, 2, 0], -1, 1)),
+        "heading": np.mod(np.pi / 2 - yaw, 2 * np.pi),
+    }

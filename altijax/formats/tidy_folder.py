@@ -16,6 +16,7 @@ import pandas as pd
 
 from altijax.constants import GAL, STANDARD_GRAVITY
 from altijax.formats.stream_checks import SPEED_UNITS, RecordingError, check_overlap, clean_rows
+from altijax.padding import bucket, padded
 from altijax.wheels import speed_from_pulses, standstill_from_pulses
 
 WHEELS = ("left", "right", "front_left", "front_right", "rear_left", "rear_right")
@@ -27,6 +28,8 @@ COLUMNS = {
     "reference": ("t", "roll", "pitch", "heading", "v_e", "v_n", "v_u", "lat", "lon", "alt"),
 }
 _ENDINGS = (".csv", ".csv.gz", ".parquet")
+# Sizes that pulses and times of one wheel are filled up to: a town drive of ten minutes has some 10,000 pulses.
+_PULSES, _SPEEDS = 16384, 16384
 _SHEET: dict[str, dict[str, Any]] = {
     "": {"name": str, "description": str, "axes": str, "wheel": dict, "site": dict, "source": dict},
     "wheel": {"pulses_per_turn": float, "radius": float, "track_width": float},
@@ -118,12 +121,14 @@ def wheel_from_pulses(
     if not times:
         return None
     t = np.arange(imu.index[0], imu.index[-1], 0.02)
-    t_pulses = np.full((len(times), max(map(len, times.values()))), np.inf)
-    for row, values in zip(t_pulses, times.values(), strict=True):
-        row[: len(values)] = values
+    # The only program that reading compiles: wheels and lengths are filled up, so that it serves other recordings too.
+    pulses_at = np.full((len(WHEELS), bucket(max(map(len, times.values())), _PULSES)), np.inf)
+    for row, values in zip(pulses_at, times.values(), strict=False):
+        row[: len(values)] = values - t[0]
+    distance = 2 * np.pi * sensor["radius"] / sensor["pulses_per_turn"]
     with jax.enable_x64(True):
-        distance = 2 * np.pi * sensor["radius"] / sensor["pulses_per_turn"]
-        speeds = np.asarray(_pulse_speeds(t_pulses - t[0], t - t[0], distance))
+        found = _pulse_speeds(pulses_at, padded(t - t[0], bucket(t.size, _SPEEDS)), np.float64(distance))
+    speeds = np.asarray(found)[: len(times), : t.size]
     table = pd.DataFrame({"t": t} | dict(zip(times, speeds, strict=True)))
     table.index = pd.RangeIndex(1, 1 + len(table), name="row")
     table.attrs["file"] = file
