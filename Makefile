@@ -6,15 +6,28 @@ READY := $(VENV)/ready
 
 PAPERS := $(patsubst papers_repro/%/reproduce.py,reproduce-%,$(wildcard papers_repro/*/reproduce.py))
 
-.PHONY: reproduce $(PAPERS) test lint lab notebooks constraints clean
+# What one command has compiled the next ones load (altijax.keep_programs).
+export ALTIJAX_KEEP_PROGRAMS ?= 1
+# Lines come as they are printed.
+export PYTHONUNBUFFERED := 1
+
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+.PHONY: reproduce $(PAPERS) test test-slow test-all lint lab notebooks constraints clean
 
 reproduce: $(PAPERS)  ## every paper's table beside ours, and real drives where ALTIJAX_DATA_DIR holds them
 
 $(PAPERS): reproduce-%: $(READY)
 	$(BIN)/python -m papers_repro $*
 
-test: $(READY)  ## all tests
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+test: $(READY)  ## what runs before each commit
+	$(PYTEST) -m "not slow"
+
+test-slow: $(READY)  ## what `make test` leaves out: notebooks, papers in small, searches
+	$(PYTEST) -m slow
+
+test-all: $(READY)  ## all tests
+	$(PYTEST)
 
 lint: $(READY)
 	$(BIN)/ruff check .

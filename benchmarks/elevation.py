@@ -10,31 +10,11 @@ import sys
 
 import numpy as np
 
-from altijax.estimates import estimate_elevation
-from tests.simulated_drives import DURATION, simulated_drive
+from altijax.samples.hilly_drives import errors_and_bars, hilly_drive
 
 # Of all samples, within one and two standard deviations.
 WANTED = ("0.60 to 0.75", "0.92 to 0.98")
-
-
-def known_heights(reference: np.ndarray, case: int) -> np.ndarray | None:
-    """Pairs (t, height) of a case."""
-    if case == 0:
-        return None
-    return reference[[0, -1]] if case == 1 else reference[reference[:, 0] <= DURATION / 3]
-
-
-def errors_and_bars(seed: int, case: int, car: str = "presumed") -> tuple[np.ndarray, np.ndarray]:
-    """Error and standard deviation wherever the height is not known, after the start of the drive."""
-    recording = simulated_drive(seed, car)
-    reference = recording.reference.reset_index().to_numpy()
-    known = known_heights(reference, case)
-    estimate = estimate_elevation(recording, method="fused", known_heights=known)
-    truth = np.interp(estimate.index, reference[:, 0], reference[:, 1]) - reference[0, 1]
-    moved = estimate["way"] > 5.0
-    moved &= estimate.index > (DURATION / 3 if case == 2 else 0)
-    moved &= estimate["way"] < estimate["way"].iloc[-1] - 5.0
-    return (estimate["elevation"] - truth)[moved].to_numpy(), estimate["elevation_std"][moved].to_numpy()
+KNOWN = ("none", "ends", "first third")
 
 
 def report(drives: int, car: str) -> None:
@@ -43,7 +23,7 @@ def report(drives: int, car: str) -> None:
     ratios: list[list[np.ndarray]] = [[], [], []]
     squares: list[list[float]] = [[], [], []]
     for seed in range(drives):
-        error, std = errors_and_bars(seed, seed % 3, car)
+        error, std = errors_and_bars(hilly_drive(seed, car), KNOWN[seed % 3])
         ratios[seed % 3].append(np.abs(error) / std)
         squares[seed % 3].append(float(np.mean(error**2)))
     for name, of_case, of_squares in zip(("no heights", "ends", "first third"), ratios, squares, strict=True):

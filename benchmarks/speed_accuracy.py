@@ -45,11 +45,11 @@ from altijax.motions import Readings, ideal_readings, road_pose
 from altijax.recordings import Recording
 from altijax.roads import Road, SpeedProfile, winding_road
 from altijax.rotations import rotvec_to_matrix
+from altijax.samples.hilly_drives import lasting
 from altijax.speed_estimate.estimates import estimate_speed
 from altijax.speed_estimate.outages import outage_errors
 from altijax.speed_estimate.steps import speed_of
 from papers_repro.us20060293826.stability import curvy_drive, error_growth
-from tests.simulated_drives import lasting
 
 DURATIONS = (10.0, 30.0, 60.0)
 LIMITS = {"2+2": (1.1, 2.4, 2.5), "2+3": (0.8, 0.8, 0.9), "6": (0.5, 0.7, 0.7)}

@@ -1,26 +1,22 @@
-"""What all tests share: double precision, and the folder of real recordings."""
+"""What all tests share: double precision, the programs kept between runs, and the folder of real recordings."""
 
 import os
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
 import jax
 import pytest
 
+from altijax.programs import KEPT_PROGRAMS, keep_programs_as_told
+
 jax.config.update("jax_enable_x64", True)
 
+# What one worker, notebook or run has compiled, all later ones load.
+os.environ.setdefault(KEPT_PROGRAMS, "1")
+keep_programs_as_told()
 
-# What one module or notebook compiles, the next loads. Each worker has a folder of its own, as processes that write to
-# the same one spoil it; a worker waits for the kernels of its notebooks, so these may have it too.
-_COMPILED = tempfile.TemporaryDirectory(prefix="altijax-compiled-")
-for _name, _value in {
-    "jax_compilation_cache_dir": _COMPILED.name,
-    "jax_persistent_cache_min_compile_time_secs": 0.0,
-    "jax_persistent_cache_min_entry_size_bytes": -1,
-}.items():
-    jax.config.update(_name, _value)
-    os.environ[_name.upper()] = str(_value)
+MAPS = Path("/proc/self/maps")
+MANY_MAPS = 40_000
 
 
 @pytest.fixture(scope="session")
@@ -35,7 +31,8 @@ def data_dir() -> Path:
 
 
 @pytest.fixture(scope="module", autouse=True)
-def _forget_compiled_functions() -> Iterator[None]:
+def _forget_compiled_functions_when_maps_run_out() -> Iterator[None]:
     """Every compiled function holds memory maps, and a process that uses up the 65,530 that Linux grants it crashes."""
     yield
-    jax.clear_caches()
+    if MAPS.exists() and len(MAPS.read_text().splitlines()) > MANY_MAPS:
+        jax.clear_caches()

@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 
 from altijax.constants import STANDARD_GRAVITY
-from altijax.motions import ideal_readings, road_pose
+from altijax.motions import Readings, ideal_readings, road_pose
 from altijax.recordings import Recording
 from altijax.roads import SpeedProfile, winding_road
 from altijax.rotations import matrix_to_euler, yaw_to_heading
@@ -18,8 +18,9 @@ jax.config.update("jax_enable_x64", True)
 TRACK_WIDTH = 1.5
 
 
-def exact_drive(start: float = 0.0) -> Recording:
-    """Ideal sensors for 60 s over hills and bends, with a stop; IMU 50 Hz, wheels 20 Hz, GNSS 5 Hz, heights 10 Hz."""
+@jax.jit
+def _truth(t: jax.Array) -> tuple[Readings, jax.Array, jax.Array]:
+    """The motion with its readings, roll, pitch and yaw (time, 3), and the heading."""
     road = winding_road(
         jnp.array([0.4]),
         jnp.array([200.0]),
@@ -38,17 +39,22 @@ def exact_drive(start: float = 0.0) -> Recording:
         wavenumber=jnp.zeros(0),
         phase=jnp.zeros(0),
     )
-    t = np.linspace(0, 60, 3001)
     truth = ideal_readings(partial(road_pose, road, profile), t, STANDARD_GRAVITY)
+    euler = matrix_to_euler(truth.C_nb)
+    return truth, euler, yaw_to_heading(euler[:, 2])
+
+
+def exact_drive(start: float = 0.0) -> Recording:
+    """Ideal sensors for 60 s over hills and bends, with a stop; IMU 50 Hz, wheels 20 Hz, GNSS 5 Hz, heights 10 Hz."""
+    t = np.linspace(0, 60, 3001)
+    truth, euler, heading = jax.tree.map(np.asarray, _truth(t))
     index = pd.Index(t + start, name="t")
     imu = pd.DataFrame(np.hstack([truth.f_b, truth.w_b]), index=index, columns=["ax", "ay", "az", "gx", "gy", "gz"])
-    half = 0.5 * TRACK_WIDTH * np.asarray(truth.w_b[:, 2])
-    speed = np.asarray(truth.speed)
-    wheel = pd.DataFrame({"speed": speed, "left": speed - half, "right": speed + half}, index=index)
-    gnss = pd.DataFrame(np.asarray(truth.velocity), index=index, columns=["v_e", "v_n", "v_u"])
-    euler = np.asarray(matrix_to_euler(truth.C_nb))
-    attitude = {"roll": euler[:, 0], "pitch": euler[:, 1], "heading": np.asarray(yaw_to_heading(euler[:, 2]))}
-    reference = gnss.assign(alt=500 + np.asarray(truth.position[:, 2]), **attitude)
+    half = 0.5 * TRACK_WIDTH * truth.w_b[:, 2]
+    wheel = pd.DataFrame({"speed": truth.speed, "left": truth.speed - half, "right": truth.speed + half}, index=index)
+    gnss = pd.DataFrame(truth.velocity, index=index, columns=["v_e", "v_n", "v_u"])
+    attitude = {"roll": euler[:, 0], "pitch": euler[:, 1], "heading": heading}
+    reference = gnss.assign(alt=500 + truth.position[:, 2], **attitude)
     return Recording(
         name="exact", imu=imu, wheel=wheel[::2], gnss=gnss[::10], reference=reference[::5], track_width=TRACK_WIDTH
     )

@@ -45,6 +45,7 @@ LEVELS = [
     ["elevation_estimate.priors"],
     ["elevation_estimate.estimates", "motion_estimate.estimates", "speed_estimate.steps"],
     ["elevation_estimate.calibration", "motion_estimate.scores", "speed_estimate.estimates"],
+    ["samples.make_hill_road", "samples.hilly_drives"],
     ["speed_estimate.outages", "speed_estimate.calibration", "motion_estimate.calibration"],
     ["estimates"],
     ["plots"],
