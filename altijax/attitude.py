@@ -66,6 +66,7 @@ class AttitudeFit:
     status: jax.Array
 
 
+@partial(jax.jit, static_argnames="starts")
 def fit_attitude(
     f_b: ArrayLike,
     f_n: ArrayLike,
@@ -116,6 +117,7 @@ def fit_attitude(
     return _fit(minimiser, f_b, f_n, euler0, prior_std, measurement_std)
 
 
+@jax.jit
 def fit_attitudes(
     f_b: ArrayLike, f_n: ArrayLike, euler0: ArrayLike, *, prior_std: ArrayLike, measurement_std: ArrayLike
 ) -> AttitudeFit:
@@ -153,6 +155,7 @@ def fit_attitudes(
     return _fit(_minima, f_b, f_n, euler0, prior_std, measurement_std)
 
 
+@jax.jit
 def hold_attitudes(
     euler: ArrayLike, covariance: ArrayLike, valid: ArrayLike, *, drift_std: ArrayLike
 ) -> tuple[jax.Array, jax.Array]:

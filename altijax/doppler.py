@@ -4,6 +4,7 @@ The correction of a receiver's stamps is one subtraction: the velocity stamped t
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -43,6 +44,7 @@ class DopplerReceiver:
     dropout_probability: ArrayLike = 0.0
 
 
+@partial(jax.jit, static_argnames="epochs")
 def doppler_velocity(
     receiver: DopplerReceiver, t: ArrayLike, v_n: ArrayLike, *, epochs: int, key: jax.Array
 ) -> tuple[jax.Array, jax.Array, jax.Array]:

@@ -92,6 +92,7 @@ def geodetic_to_ecef(geodetic: ArrayLike) -> jax.Array:
     return jnp.stack([p * jnp.cos(longitude), p * jnp.sin(longitude), (n * (1 - _E2) + height) * sin], -1)
 
 
+@jax.jit
 def ecef_to_geodetic(ecef: ArrayLike) -> jax.Array:
     """Geodetic coordinates of an Earth-centred Earth-fixed position; the inverse of `geodetic_to_ecef`.
 

@@ -57,14 +57,15 @@ def keep_programs(folder: str | os.PathLike[str] | None = None) -> Path:
     Parameters
     ----------
     folder : path, optional
-        Where; by default ``altijax/programs`` in the user's cache directory.
+        Where, in its subfolder ``programs``; by default in AltiJAX's part of the user's cache directory.
 
     Returns
     -------
     folder : Path
         Where they are kept.
     """
-    path = Path(folder) if folder is not None else platformdirs.user_cache_path("altijax") / "programs"
+    # Into a folder that JAX once filled without a bound it would write nothing more: programs have one of their own.
+    path = (platformdirs.user_cache_path("altijax") if folder is None else Path(folder)) / "programs"
     path.mkdir(parents=True, exist_ok=True)
     for name, value in {
         "jax_compilation_cache_dir": str(path),

@@ -159,6 +159,7 @@ def progress(profile: SpeedProfile, t: ArrayLike) -> jax.Array:
     return s + jnp.sum(modulation * (jnp.sin(wavenumber * s + phase) - jnp.sin(phase)))
 
 
+@jax.jit
 def slope_road(way: ArrayLike, horizontal: ArrayLike, rise: ArrayLike) -> Road:
     """A straight slope to the East of given lengths, steepest in its middle; progress is its horizontal length.
 

@@ -123,6 +123,7 @@ class Gyro:
     resolution: ArrayLike = 0.0
 
 
+@jax.jit
 def accelerometer_output(
     accelerometer: Accelerometer,
     f_b: ArrayLike,
@@ -161,6 +162,7 @@ def accelerometer_output(
     return _output(accelerometer, felt, dt, temperature, key)
 
 
+@jax.jit
 def gyro_output(
     gyro: Gyro,
     w_b: ArrayLike,

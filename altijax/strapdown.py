@@ -12,6 +12,7 @@ from altijax._shapes import require_shape
 from altijax.rotations import rotvec_to_matrix
 
 
+@jax.jit
 def integrate_attitude(w_b: ArrayLike, C_nb0: ArrayLike, dt: ArrayLike) -> jax.Array:
     """Attitude from the rate of turn, of second order in the step and exact where the rate is constant.
 

@@ -200,6 +200,7 @@ def wheel_pulses(
     return jnp.where(reached, t[i] + wait, jnp.inf), (_passed(wheel, angle[..., -1:]) - before)[..., 0]
 
 
+@jax.jit
 def way_from_pulses(t_pulses: ArrayLike, t: ArrayLike, distance: ArrayLike) -> jax.Array:
     """Way of one wheel, counted from its first pulse; at each pulse it is the number of pulses times `distance`.
 
@@ -227,6 +228,7 @@ def way_from_pulses(t_pulses: ArrayLike, t: ArrayLike, distance: ArrayLike) -> j
     return distance[..., None] * passed
 
 
+@jax.jit
 def speed_from_pulses(
     t_pulses: ArrayLike, t: ArrayLike, distance: ArrayLike, distance_std: ArrayLike = 0.0
 ) -> tuple[jax.Array, jax.Array]:
@@ -268,6 +270,7 @@ def speed_from_pulses(
     return distance * rate, _safe.norm(jnp.stack(parts, -1))
 
 
+@jax.jit
 def standstill_from_pulses(t_pulses: ArrayLike, t: ArrayLike, quiet: ArrayLike) -> jax.Array:
     """Whether a wheel is taken to stand still: no pulse for long, before and after.
 
