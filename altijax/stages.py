@@ -16,7 +16,8 @@ Item = TypeVar("Item")
 
 logger = logging.getLogger("altijax")
 
-_SILENT = 2.0  # s
+# Until the first word, and between two ticks of the clock, s.
+_SILENT, _TICK = 2.0, 1.0
 
 
 class Stages:
@@ -39,15 +40,14 @@ class Stages:
 
 
 class _Bar:
-    """A progress bar of tqdm that comes into being when the work has taken a while."""
+    """A line of tqdm that comes into being when the work has taken a while, and whose clock then ticks."""
 
     def __init__(self) -> None:
         self._stage, self._compiling = "", ""
+        self._began = time.time()
         self._shown: Any = None
-        self._lock = threading.Lock()
-        self._timer = threading.Timer(_SILENT, self._appear)
-        self._timer.daemon = True
-        self._timer.start()
+        self._lock, self._closed = threading.Lock(), threading.Event()
+        threading.Thread(target=self._appear, daemon=True).start()
 
     def show(self, stage: str) -> None:
         self._stage = stage
@@ -59,21 +59,28 @@ class _Bar:
         self._refresh()
 
     def close(self) -> None:
-        self._timer.cancel()
+        self._closed.set()
         with self._lock:
             if self._shown is not None:
                 self._shown.close()
 
     def _appear(self) -> None:
+        if self._closed.wait(_SILENT):
+            return
         from tqdm.auto import tqdm  # importing it takes as long as a short estimate
 
         with self._lock:
+            if self._closed.is_set():
+                return
             self._shown = tqdm(bar_format="{desc} [{elapsed}]", leave=False)
+            self._shown.start_t = self._began
         self._refresh()
+        while not self._closed.wait(_TICK):
+            self._refresh()
 
     def _refresh(self) -> None:
         with self._lock:
-            if self._shown is not None:
+            if self._shown is not None and not self._closed.is_set():
                 self._shown.set_description_str(self._stage + self._compiling)
 
 
@@ -105,7 +112,7 @@ def stages(title: str, total: int | None = None) -> Iterator[Stages]:
 
     def begins(event: str, value: float, **kwargs: str | int) -> None:
         if event == COMPILATION:
-            bar.compiling(str(kwargs.get("fun_name", "a program")))
+            bar.compiling(str(kwargs.get("fun_name", "")).removeprefix("jit(").removesuffix(")").strip("_"))
 
     def ends(event: str, duration_secs: float, **kwargs: str | int) -> None:
         if event == COMPILATION:

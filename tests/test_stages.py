@@ -37,6 +37,15 @@ def test_long_work_says_what_it_is_at(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "calibration: noise levels" in text and "outages 2/3" in text and "compiling" in text
 
 
+def test_the_clock_ticks_while_nothing_else_happens(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "_SILENT", 0.05)
+    shown = io.StringIO()
+    monkeypatch.setattr(sys, "stderr", shown)
+    with stages("one long stage"):
+        time.sleep(2.4)
+    assert "[00:01]" in shown.getvalue() and "[00:02]" in shown.getvalue()
+
+
 def test_the_log_tells_programs_and_seconds(caplog: pytest.LogCaptureFixture) -> None:
     with caplog.at_level(logging.INFO, logger="altijax"), stages("work") as stage:
         stage("one")
