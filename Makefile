@@ -18,7 +18,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loads
 reproduce: $(PAPERS)  ## every paper's table beside ours, and real drives where ALTIJAX_DATA_DIR holds them
 
 $(PAPERS): reproduce-%: $(READY)
-	$(BIN)/python -m papers_repro $*
+	@TQDM_DISABLE=1 $(BIN)/python -m papers_repro $*
 
 test: $(READY)  ## what runs before each commit
 	$(PYTEST) -m "not slow"

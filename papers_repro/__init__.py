@@ -4,11 +4,13 @@
 
 A paper is a folder here with a `reproduce.py`. It is found by being there; the whole protocol is one function,
 
-    def reproduce(output: Path) -> Report
+    def reproduce(output: Path) -> Iterator[Report]
 
-where `output` is the paper's own folder of results (it exists) for whatever files the part makes, and `Report`
-(papers_repro.comparison) holds the comparisons, the findings and remarks such as what could not be run and why. A
-`paper.toml` beside it records what is known to deviate, so that a change either way is seen:
+where `output` is the paper's own folder of results (it exists) for whatever files it makes. It hands over its report in
+parts, each as soon as it is ready, and shows what it is doing by `papers_repro.progress.stage`. A `Report`
+(papers_repro.comparison) holds comparisons, findings, remarks such as what could not be run and why, and which files
+hold which element of the paper; `index.csv` in the folder of all results lists these. A `paper.toml` beside
+`reproduce.py` records what is known to deviate, so that a change either way is seen:
 
     [verdicts]          outcome = ["table/row/column", ...]
     [findings."kind"]   "where" = "expected"

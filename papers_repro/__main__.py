@@ -6,7 +6,9 @@ import sys
 from pathlib import Path
 from textwrap import fill
 
-from papers_repro.report import WIDTH, deviations, format_report, summary, write_report
+from papers_repro.comparison import whole
+from papers_repro.progress import paper_at_work
+from papers_repro.report import WIDTH, deviations, format_report, summary, write_index, write_report
 
 FOLDER = Path(__file__).parent
 
@@ -35,9 +37,14 @@ def main(arguments: list[str] | None = None) -> int:
     for paper in options.paper or known_papers():
         output = options.output / paper
         output.mkdir(parents=True, exist_ok=True)
-        report = importlib.import_module(f"papers_repro.{paper}.reproduce").reproduce(output)
+        parts = []
+        with paper_at_work(paper):
+            for part in importlib.import_module(f"papers_repro.{paper}.reproduce").reproduce(output):
+                print(f"\n{format_report(part, every_number=options.all)}\n", flush=True)
+                parts.append(part)
+        report = whole(parts)
         write_report(report, output)
-        print(format_report(report, every_number=options.all), end="\n\n\n")
+        write_index(options.output)
         lines.append(f"{paper}: {summary(report.comparisons, report.findings)}")
         deviating = deviations(report, FOLDER / paper / "paper.toml")
         if deviating:
@@ -47,7 +54,8 @@ def main(arguments: list[str] | None = None) -> int:
                 fill(deviation, WIDTH, initial_indent="  ", subsequent_indent="      ") for deviation in deviating
             ]
     print(*lines, sep="\n")
-    print(f"Written to {options.output}. Verdicts and findings are {'as' if sound else 'NOT as'} recorded.")
+    recorded = f"Verdicts and findings are {'as' if sound else 'NOT as'} recorded."
+    print(f"{recorded} Written to {options.output}, where index.csv says which file holds which table or figure.")
     return 0 if sound else 1
 
 

@@ -152,8 +152,27 @@ class Finding:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Output:
+    """A file of the results, and which element of the paper it holds.
+
+    Attributes
+    ----------
+    element
+        As the paper calls it: "Table 2", "Fig. 6", "Eq. (5)".
+    file
+        Name in the paper's folder of results.
+    holds
+        What of it.
+    """
+
+    element: str
+    file: str
+    holds: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Report:
-    """All that one paper's `reproduce` hands back.
+    """A part of what one paper's `reproduce` hands over, or all of it.
 
     Attributes
     ----------
@@ -167,13 +186,32 @@ class Report:
         A line on what each table holds, by `Comparison.table`.
     remarks
         Lines a reader needs: what was not published, what was not run and why.
+    outputs
+        Which files hold which elements of the paper.
     """
 
     title: str
-    comparisons: list[Comparison]
+    comparisons: list[Comparison] = field(default_factory=list)
     findings: list[Finding] = field(default_factory=list)
     tables: dict[str, str] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
+    outputs: list[Output] = field(default_factory=list)
+
+
+def whole(parts: Iterable[Report]) -> Report:
+    """All parts of a report together, under the title of the first."""
+    first, *others = parts
+    together = first
+    for part in others:
+        together = replace(
+            together,
+            comparisons=together.comparisons + part.comparisons,
+            findings=together.findings + part.findings,
+            tables=together.tables | part.tables,
+            remarks=together.remarks + part.remarks,
+            outputs=together.outputs + part.outputs,
+        )
+    return together
 
 
 @cache

@@ -10,7 +10,9 @@ from dataclasses import asdict, fields
 from itertools import groupby
 from pathlib import Path
 
-from papers_repro.comparison import HYPOTHESES, Comparison, Finding, Report
+from filelock import FileLock
+
+from papers_repro.comparison import HYPOTHESES, Comparison, Finding, Output, Report
 
 WIDTH = 120
 VERDICTS = ("match", "explained", "differs")
@@ -32,6 +34,9 @@ def format_report(report: Report, *, every_number: bool = False) -> str:
         found = [finding for finding in report.findings if finding.inconsistency == inconsistency]
         if found:
             parts += ["", f"{heading}: {len(found)}", "-" * len(heading), *_findings(found)]
+    if report.outputs:
+        outputs = [[output.element, output.file, output.holds] for output in report.outputs]
+        parts += ["", *_aligned(["of the paper", "file", ""], outputs)]
     return "\n".join(parts)
 
 
@@ -47,10 +52,11 @@ def summary(comparisons: Sequence[Comparison], findings: Sequence[Finding]) -> s
 
 
 def write_report(report: Report, output: Path) -> None:
-    """comparison and findings in `output`, each as .csv and .json with the same rows."""
+    """comparison, findings and outputs in `output`, each as .csv and .json with the same rows."""
     for name, kind, rows in (
         ("comparison", Comparison, report.comparisons),
         ("findings", Finding, report.findings),
+        ("outputs", Output, report.outputs),
     ):
         records = [asdict(row) for row in rows]
         (output / f"{name}.json").write_text(json.dumps(records, indent=1) + "\n")
@@ -58,6 +64,16 @@ def write_report(report: Report, output: Path) -> None:
             writer = csv.DictWriter(file, [field.name for field in fields(kind)])
             writer.writeheader()
             writer.writerows(records)
+
+
+def write_index(results: Path) -> None:
+    """index.csv in the folder of all results: which file holds which element of which paper."""
+    # Papers that run at the same time end at the same time.
+    with FileLock(results / ".index.lock"), (results / "index.csv").open("w", newline="") as file:
+        writer = csv.writer(file)
+        writer.writerow(["paper", *(field.name for field in fields(Output))])
+        for listed in sorted(results.glob("*/outputs.json")):
+            writer.writerows([listed.parent.name, *row.values()] for row in json.loads(listed.read_text()))
 
 
 def deviations(report: Report, record: Path) -> list[str]:

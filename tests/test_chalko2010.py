@@ -8,14 +8,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from altijax.rotations import euler_to_matrix
-from papers_repro.chalko2010 import reproduce as paper
-from papers_repro.chalko2010 import strategies, sweeps
+from papers_repro.chalko2010 import reproduce as paper, strategies, sweeps
 from papers_repro.chalko2010.basins import basins, initial_errors
 from papers_repro.chalko2010.cases import MOUNTING, judge, turned
 from papers_repro.chalko2010.epochs import epochs_of, full_rate_attitude, full_rate_velocity, reference_attitude
 from papers_repro.chalko2010.equations import EXACT, equations, kink, mean_error, rank, singular_values
 from papers_repro.chalko2010.experiments import MOTIONS, exact_readings, simulated_recording
-from papers_repro.comparison import Report
+from papers_repro.comparison import Report, whole
 from papers_repro.report import deviations
 
 
@@ -35,7 +34,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Report, Path]:
         patch.setattr(sweeps, "FREQUENCIES", sweeps.FREQUENCIES[[0, 5, 6, 12]])
         patch.setattr(paper, "BASIN_POINTS", 9)
         patch.setattr(paper, "real_recordings", lambda: ([], []))
-        return paper.reproduce(output), output
+        return whole(paper.reproduce(output)), output
 
 
 @pytest.fixture(scope="module")
@@ -51,6 +50,7 @@ def test_findings_and_verdicts_are_the_recorded_ones(small):
 
 def test_files_are_written(small):
     report, output = small
+    assert {held.file for held in report.outputs} == {path.name for path in output.iterdir()}
     assert {path.name for path in output.iterdir()} == {
         "attitudes.csv",
         "sweeps.csv",

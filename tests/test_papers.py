@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import time
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
@@ -18,12 +19,21 @@ import pandas as pd
 import pytest
 
 import papers_repro
-from papers_repro import __main__ as command_line
-from papers_repro import comparison as engine
-from papers_repro.comparison import Comparison, Finding, Interval, Recomputed, Report, compare, compare_bound, parse
-from papers_repro.report import deviations, format_report, number_key, outcome
-from papers_repro.shirai2000 import reproduce as shirai2000
-from papers_repro.shirai2000 import simulated
+from papers_repro import __main__ as command_line, comparison as engine, progress
+from papers_repro.comparison import (
+    Comparison,
+    Finding,
+    Interval,
+    Output,
+    Recomputed,
+    Report,
+    compare,
+    compare_bound,
+    parse,
+    whole,
+)
+from papers_repro.report import deviations, format_report, number_key, outcome, write_index, write_report
+from papers_repro.shirai2000 import reproduce as shirai2000, simulated
 from papers_repro.shirai2000.statements import statements
 from papers_repro.shirai2000.tables import compare_derived, derive, read_tables
 from papers_repro.shirai2000.wheel_ways import largest_quantum
@@ -70,13 +80,14 @@ def simulations() -> Iterator[None]:
         for where, expected in PAPER["findings"].get(kind, {}).items()
     ]
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulated, "simulated", lambda *_: (["", "simulated"], comparisons, findings))
+        part = Report(title="simulated", comparisons=comparisons, findings=findings, tables=PAPER["simulated_tables"])
+        patch.setattr(simulated, "simulated", lambda *_: iter([part]))
         yield
 
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Report:
-    return shirai2000.reproduce(tmp_path_factory.mktemp("results"))
+    return whole(shirai2000.reproduce(tmp_path_factory.mktemp("results")))
 
 
 def judge(printed: str, value: str, reach: tuple[str, str] | None = None, **rest: object) -> Comparison:
@@ -517,7 +528,7 @@ def test_a_folder_with_a_reproduce_is_a_paper(
         "def reproduce(output):\n"
         "    (output / 'extra.txt').write_text('made')\n"
         "    rms = compare_bound(table='drive', row='slope', column='rms', unit='m', bound='1.6', ours=1.5)\n"
-        "    return Report(title='Drives', comparisons=[rms], remarks=['one drive'])\n"
+        "    yield Report(title='Drives', comparisons=[rms], remarks=['one drive'])\n"
     )
     monkeypatch.setattr(command_line, "FOLDER", tmp_path / "papers")
     monkeypatch.setattr(papers_repro, "__path__", [str(tmp_path / "papers")])
@@ -526,6 +537,51 @@ def test_a_folder_with_a_reproduce_is_a_paper(
     assert (tmp_path / "results/drives2030/extra.txt").read_text() == "made"
     printed = capsys.readouterr().out
     assert "<= 1.6" in printed and "1 numbers: 1 match" in printed
+
+
+def test_the_index_says_which_file_holds_what(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of every paper that has results, also where it ran by itself."""
+    for paper in ("first", "second"):
+        (tmp_path / paper).mkdir()
+        held = Output(element="Fig. 1", file="figure_1.png", holds="a line")
+        write_report(Report(title=paper, outputs=[held]), tmp_path / paper)
+        write_index(tmp_path)
+    index = pd.read_csv(tmp_path / "index.csv")
+    assert index.to_dict("list") == {
+        "paper": ["first", "second"],
+        "element": 2 * ["Fig. 1"],
+        "file": 2 * ["figure_1.png"],
+        "holds": 2 * ["a line"],
+    }
+
+
+def test_every_table_of_the_paper_is_in_a_file(tmp_path: Path, report: Report) -> None:
+    assert command_line.main(["shirai2000", "--output", str(tmp_path)]) == 0
+    index = pd.read_csv(tmp_path / "index.csv")
+    assert set(index["element"]) == {f"Table {table}" for table in PAPER["tables"]}
+    assert all((tmp_path / row.paper / row.file).is_file() for row in index.itertuples())
+
+
+def test_a_stage_says_that_it_begins_goes_on_and_ends(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(progress, "_PATIENCE", 0.05)
+    with progress.paper_at_work("drives2030"), progress.stage("runs", 3) as advance:
+        advance()
+        time.sleep(0.2)
+    first, *more, last = capsys.readouterr().out.splitlines()
+    assert first == "drives2030: runs: begins"
+    assert more and more[0] == "drives2030: runs: 0 s so far, 1 of 3 done"
+    assert last == "drives2030: runs: done in 0 s"
+
+
+def test_parts_make_a_whole(report: Report) -> None:
+    half = len(report.comparisons) // 2
+    first = Report(title="first", comparisons=report.comparisons[:half], tables={"1": "a"}, remarks=["one"])
+    second = Report(title="second", comparisons=report.comparisons[half:], tables={"2": "b"}, remarks=["two"])
+    together = whole([first, second])
+    assert (together.title, together.comparisons) == ("first", report.comparisons)
+    assert (together.tables, together.remarks) == ({"1": "a", "2": "b"}, ["one", "two"])
 
 
 def test_short_reports_show_every_number(report: Report) -> None:

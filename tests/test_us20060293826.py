@@ -13,10 +13,9 @@ from altijax.datasets import DatasetNotFoundError
 from altijax.recordings import Recording
 from altijax.speed_estimate import estimates as speed_estimates
 from altijax.speed_estimate.outages import outage_table
-from papers_repro.comparison import Report
+from papers_repro.comparison import Report, whole
 from papers_repro.report import deviations
-from papers_repro.us20060293826 import outages
-from papers_repro.us20060293826 import reproduce as paper
+from papers_repro.us20060293826 import outages, reproduce as paper
 from papers_repro.us20060293826.equations import EXACT, Equation, equation_findings, equations, unexplained
 from papers_repro.us20060293826.experiments import calibrated_readings, figure_drives, readings_of, turning_of
 from papers_repro.us20060293826.stability import curvy_drive, error_growth
@@ -38,7 +37,7 @@ def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Report, Path]:
         patch.setattr(paper, "RUNS", 16)
         patch.setattr(paper, "SWINGS", (1.0, 3.0))
         patch.setattr(paper, "QUALITIES", (0.3, 3.0))
-        return paper.reproduce(output), output
+        return whole(paper.reproduce(output)), output
 
 
 def test_equations_hold_or_are_corrected():
@@ -65,7 +64,8 @@ def test_verdicts_and_findings_are_the_recorded_ones(small):
 
 
 def test_pictures_and_errors_are_written(small):
-    _, output = small
+    report, output = small
+    assert {held.file for held in report.outputs} == {path.name for path in output.iterdir()}
     assert {path.name for path in output.iterdir()} == {
         "figure_6.png",
         "figure_7.png",

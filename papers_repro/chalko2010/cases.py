@@ -4,6 +4,7 @@ import warnings
 from collections.abc import Iterator
 from dataclasses import replace
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
@@ -77,35 +78,44 @@ def turned(recording: Recording) -> Recording:
     imu, reference = recording.imu, recording.reference
     if imu is None or reference is None:
         raise ValueError(f"recording {recording.name!r} has no IMU or no reference")
-    C = euler_to_matrix(jnp.radians(jnp.array(MOUNTING)))
+    angles = ["roll", "pitch", "heading"]
+    C, of_device = (np.asarray(x) for x in _turned_angles(reference[angles].to_numpy(float)))
     imu, reference = imu.copy(), reference.copy()
     for columns in (["ax", "ay", "az"], ["gx", "gy", "gz"]):
-        imu[columns] = imu[columns].to_numpy() @ np.asarray(C)
-    roll, pitch, heading = reference[["roll", "pitch", "heading"]].to_numpy(float).T
-    euler = matrix_to_euler(euler_to_matrix(jnp.stack([roll, pitch, heading_to_yaw(heading)], -1)) @ C)
-    reference[["roll", "pitch"]] = np.asarray(euler[:, :2])
-    reference["heading"] = np.asarray(yaw_to_heading(euler[:, 2]))
+        imu[columns] = imu[columns].to_numpy() @ C
+    reference[angles] = of_device
     return replace(recording, name=f"{recording.name}, turned", imu=imu, reference=reference)
+
+
+@jax.jit
+def _turned_angles(angles: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """The mounting as a matrix, and roll, pitch and heading (time, 3) of a device so mounted from its vehicle's."""
+    C = euler_to_matrix(jnp.radians(jnp.array(MOUNTING)))
+    roll, pitch, heading = angles.T
+    euler = matrix_to_euler(euler_to_matrix(jnp.stack([roll, pitch, heading_to_yaw(heading)], -1)) @ C)
+    return C, jnp.stack([euler[:, 0], euler[:, 1], yaw_to_heading(euler[:, 2])], -1)
 
 
 def judge(recording: Recording) -> pd.DataFrame:
     """RMS errors of every strategy at mid-epoch, and of its velocity at full rate."""
     epochs = epochs_of(recording)
+    t = np.asarray(epochs.t)
     true = reference_attitude(recording, epochs.t_middle)
     rows = {}
     for strategy in STRATEGIES:
         C_middle = strategy.attitudes(epochs)
         C_nb = full_rate_attitude(epochs, C_middle, carried=strategy.carried)
         velocity = full_rate_velocity(epochs, C_nb)
-        rows[strategy.name] = [*attitude_errors(C_middle, true), velocity_error(recording, epochs.t, velocity)]
-    straight = velocity_error(recording, epochs.t, interpolated_velocity(epochs, epochs.v_knots))
+        errors = np.asarray(attitude_errors(C_middle, true))
+        rows[strategy.name] = [*errors, velocity_error(recording, t, velocity)]
+    straight = velocity_error(recording, t, interpolated_velocity(epochs, epochs.v_knots))
     rows["interpolated"] = [np.nan, np.nan, np.nan, straight]
     return pd.DataFrame.from_dict(
         {name: np.array(row, float) for name, row in rows.items()}, orient="index", columns=COLUMNS
     )
 
 
-def velocity_error(recording: Recording, t: jnp.ndarray, velocity: jnp.ndarray) -> float:
+def velocity_error(recording: Recording, t: np.ndarray, velocity: jax.Array) -> float:
     """RMS length of the error against the reference, where epochs lie on both sides."""
     if recording.reference is None or recording.imu is None or recording.gnss is None:
         raise ValueError(f"recording {recording.name!r} has no reference, IMU or GNSS")

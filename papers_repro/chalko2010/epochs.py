@@ -6,6 +6,7 @@ belongs to mid-epoch. With a gyro every sample is also turned into the axes of i
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -119,20 +120,15 @@ def epochs_of(recording: Recording, *, rate: float = 50.0) -> Epochs:
         ends = np.stack([[np.interp(e, t_imu, column) for column in integral.T] for e in edges])
         samples = ((ends[1] - ends[0]) / (edges[1] - edges[0])).T
     else:
-        samples = np.asarray(resample(t, t_imu, readings, np.inf, axis=-2)[0])
+        samples = np.stack([np.interp(t, t_imu, column) for column in readings.T], -1)
     velocity = gnss[["v_e", "v_n", "v_u"]].dropna()
     t_knots = velocity.index.to_numpy(float) - start
     inside = (t_knots >= 0) & (t_knots <= t[-1])
-    return epochs_of_arrays(
-        jnp.asarray(t),
-        jnp.asarray(samples[:, :3]),
-        jnp.asarray(samples[:, 3:]),
-        jnp.asarray(t_knots[inside]),
-        jnp.asarray(velocity.to_numpy(float)[inside]),
-        jnp.asarray(gravity_at(recording)),
-    )
+    v_knots, gravity = velocity.to_numpy(float)[inside], np.float64(gravity_at(recording))
+    return epochs_of_arrays(t, samples[:, :3], samples[:, 3:], t_knots[inside], v_knots, gravity)
 
 
+@partial(jax.jit, static_argnames="carried")
 def full_rate_attitude(epochs: Epochs, C_middle: jax.Array, *, carried: bool) -> jax.Array:
     """Attitude (..., samples, 3, 3) from that at mid-epoch, by constant rates or by the gyro, its drift even."""
     if not carried:
@@ -141,6 +137,7 @@ def full_rate_attitude(epochs: Epochs, C_middle: jax.Array, *, carried: bool) ->
     return interpolate_rotations(epochs.t, epochs.t_middle, first) @ epochs.turned
 
 
+@jax.jit
 def full_rate_velocity(epochs: Epochs, C_nb: jax.Array) -> jax.Array:
     """Velocity (..., samples, 3): accelerations integrated, and bent linearly between velocities to meet them."""
     up = jnp.array([0.0, 0.0, 1.0])
@@ -150,6 +147,7 @@ def full_rate_velocity(epochs: Epochs, C_nb: jax.Array) -> jax.Array:
     return gained + interpolated_velocity(epochs, epochs.v_knots - at_knots)
 
 
+@jax.jit
 def interpolated_velocity(epochs: Epochs, knots: jax.Array) -> jax.Array:
     """Straight lines between values at the knots (..., samples, 3)."""
     return resample(epochs.t, epochs.t_knots, knots, jnp.inf, axis=-2)[0]
@@ -161,9 +159,13 @@ def reference_attitude(recording: Recording, t: jax.Array) -> jax.Array:
     if reference is None or imu is None:
         raise ValueError(f"recording {recording.name!r} has no reference or no IMU")
     known = reference[["roll", "pitch", "heading"]].dropna()
-    roll, pitch, heading = known.to_numpy(float).T
-    C = euler_to_matrix(jnp.stack([roll, pitch, heading_to_yaw(heading)], -1))
-    return interpolate_rotations(t, jnp.asarray(known.index.to_numpy(float) - float(imu.index[0])), C)
+    return _interpolated_attitude(t, known.index.to_numpy(float) - float(imu.index[0]), known.to_numpy(float))
+
+
+@jax.jit
+def _interpolated_attitude(t: jax.Array, t_known: jax.Array, angles: jax.Array) -> jax.Array:
+    roll, pitch, heading = angles.T
+    return interpolate_rotations(t, t_known, euler_to_matrix(jnp.stack([roll, pitch, heading_to_yaw(heading)], -1)))
 
 
 @jax.jit

@@ -4,6 +4,7 @@ Its axes are ours (East, North, up; x forward, y left, z up), and its R is the t
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -32,57 +33,44 @@ class Equation:
     left_over: float
 
 
+# What each says, by its number.
+PRINTED = {
+    "(1)": ("v = (SOG sin COG, SOG cos COG, CR)", "m/s"),
+    "(2), product": ("R = R(phi) R(theta) R(psi), multiplied out", "1"),
+    "(2), inverse": ("R^-1 = R^T, by reversed order and signs", "1"),
+    "(2), attitude": ("R maps ENU to xyz", "1"),
+    "(4)": ("R^-1 a = A + g U", "m/s^2"),
+    "text before (4)": ("A = a-dot", "m/s^2 against m/s^3"),
+    "text before (4), corrected": ("A = v-dot, as a mean between two velocities", "m/s^2"),
+}
+
+
 def equations() -> list[Equation]:
     """Every equation that the motion can decide, as printed."""
-    r = exact_readings("windsurfer")
+    left_over = _left_over(exact_readings("windsurfer"))
+    return [
+        Equation(number=number, text=text, unit=unit, left_over=float(left_over[number]))
+        for number, (text, unit) in PRINTED.items()
+    ]
+
+
+@jax.jit
+def _left_over(r: Readings) -> dict[str, jax.Array]:
     roll, pitch, yaw = matrix_to_euler(r.C_nb).T
     v, a = r.velocity, r.acceleration
     sog, cog = jnp.hypot(v[:, 0], v[:, 1]), jnp.arctan2(v[:, 0], v[:, 1])
     R = _printed(roll, pitch, yaw)
     turned = jnp.einsum("...ji,...j->...i", R, r.f_b)
-
-    def rms(rest: jax.Array) -> float:
-        return float(jnp.sqrt(jnp.mean(rest * rest)))
-
-    return [
-        Equation(
-            number="(1)",
-            text="v = (SOG sin COG, SOG cos COG, CR)",
-            unit="m/s",
-            left_over=rms(course_to_velocity(sog, cog, v[:, 2]) - v),
-        ),
-        Equation(
-            number="(2), product",
-            text="R = R(phi) R(theta) R(psi), multiplied out",
-            unit="1",
-            left_over=rms(_factor_x(roll) @ _factor_y(pitch) @ _factor_z(yaw) - R),
-        ),
-        Equation(
-            number="(2), inverse",
-            text="R^-1 = R^T, by reversed order and signs",
-            unit="1",
-            left_over=rms(_factor_z(-yaw) @ _factor_y(-pitch) @ _factor_x(-roll) - jnp.swapaxes(R, -1, -2)),
-        ),
-        Equation(
-            number="(2), attitude",
-            text="R maps ENU to xyz",
-            unit="1",
-            left_over=rms(R - jnp.swapaxes(r.C_nb, -1, -2)),
-        ),
-        Equation(number="(4)", text="R^-1 a = A + g U", unit="m/s^2", left_over=rms(turned - (a + UP))),
-        Equation(
-            number="text before (4)",
-            text="A = a-dot",
-            unit="m/s^2 against m/s^3",
-            left_over=rms(derivative(r.t, r.f_b, axis=-2) - a),
-        ),
-        Equation(
-            number="text before (4), corrected",
-            text="A = v-dot, as a mean between two velocities",
-            unit="m/s^2",
-            left_over=rms(jnp.diff(v, axis=0) / jnp.diff(r.t)[:, None] - _means_by_simpson(a)),
-        ),
-    ]
+    rests = {
+        "(1)": course_to_velocity(sog, cog, v[:, 2]) - v,
+        "(2), product": _factor_x(roll) @ _factor_y(pitch) @ _factor_z(yaw) - R,
+        "(2), inverse": _factor_z(-yaw) @ _factor_y(-pitch) @ _factor_x(-roll) - jnp.swapaxes(R, -1, -2),
+        "(2), attitude": R - jnp.swapaxes(r.C_nb, -1, -2),
+        "(4)": turned - (a + UP),
+        "text before (4)": derivative(r.t, r.f_b, axis=-2) - a,
+        "text before (4), corrected": jnp.diff(v, axis=0) / jnp.diff(r.t)[:, None] - _means_by_simpson(a),
+    }
+    return {number: jnp.sqrt(jnp.mean(rest * rest)) for number, rest in rests.items()}
 
 
 def singular_values(euler: jax.Array, f_b: jax.Array) -> jax.Array:
@@ -105,17 +93,19 @@ class Rank:
 
 
 def rank(r: Readings) -> Rank:
-    euler = matrix_to_euler(r.C_nb)
-    values = jax.jit(singular_values)(euler, r.f_b)
+    second, third, turned = (float(x) for x in _rank(r))
+    return Rank(second=second, third=third, turned=turned)
+
+
+@jax.jit
+def _rank(r: Readings) -> tuple[jax.Array, jax.Array, jax.Array]:
+    values = singular_values(matrix_to_euler(r.C_nb), r.f_b)
     f_n = r.acceleration + UP
     axis = f_n / jnp.linalg.norm(f_n, axis=-1, keepdims=True)
     angles = jnp.linspace(-jnp.pi, jnp.pi, 9)[:, None, None]
     C = rotvec_to_matrix(angles * axis) @ r.C_nb
-    return Rank(
-        second=float(jnp.min(values[:, 1])),
-        third=float(jnp.max(values[:, 2])),
-        turned=float(jnp.max(jnp.linalg.norm(jnp.einsum("...ij,...j->...i", C, r.f_b) - f_n, axis=-1))),
-    )
+    turned = jnp.max(jnp.linalg.norm(jnp.einsum("...ij,...j->...i", C, r.f_b) - f_n, axis=-1))
+    return jnp.min(values[:, 1]), jnp.max(values[:, 2]), turned
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -132,7 +122,11 @@ class MeanError:
 
 def mean_error(motion: str, interval: float = 1.0) -> MeanError:
     """Of epochs of `interval` seconds; sums of many samples stand for the integrals."""
-    r = exact_readings(motion)
+    return MeanError(**{name: float(x) for name, x in _mean_error(exact_readings(motion), interval).items()})
+
+
+@partial(jax.jit, static_argnames="interval")
+def _mean_error(r: Readings, interval: float) -> dict[str, jax.Array]:
     n = round(interval * FINE_RATE)
     epochs = (r.t.size - 1) // n
     # Samples of an epoch with both its ends, for the trapezoidal rule.
@@ -146,31 +140,35 @@ def mean_error(motion: str, interval: float = 1.0) -> MeanError:
     lengths = jnp.linalg.norm(f_n, axis=-1), jnp.linalg.norm(at_middle, axis=-1)
     cosine = jnp.sum(f_n * at_middle, -1) / (lengths[0] * lengths[1])
 
-    def rms(x: jax.Array) -> float:
-        return float(jnp.sqrt(jnp.mean(x * x)))
+    def rms(x: jax.Array) -> jax.Array:
+        return jnp.sqrt(jnp.mean(x * x))
 
-    return MeanError(
-        vector=rms(jnp.linalg.norm(at_middle - f_n, axis=-1)),
-        angle=rms(jnp.degrees(jnp.arccos(jnp.clip(cosine, -1, 1)))),
-        shortening=float(jnp.mean(lengths[0] - lengths[1])),
-        carried=rms(jnp.linalg.norm(carried - f_n, axis=-1)),
-    )
+    return {
+        "vector": rms(jnp.linalg.norm(at_middle - f_n, axis=-1)),
+        "angle": rms(jnp.degrees(jnp.arccos(jnp.clip(cosine, -1, 1)))),
+        "shortening": jnp.mean(lengths[0] - lengths[1]),
+        "carried": rms(jnp.linalg.norm(carried - f_n, axis=-1)),
+    }
 
 
 def kink(r: Readings) -> tuple[float, float]:
     """Slopes of Eq. (5) to either side of its minimum, per radian of roll, at the beginning of a motion."""
+    before, after = _slopes(r, np.array([-1e-6, 1e-6]))
+    return float(before), float(after)
+
+
+@jax.jit
+def _slopes(r: Readings, angles: jax.Array) -> jax.Array:
     C, f_b, f_n = r.C_nb[0], r.f_b[0], r.acceleration[0] + UP
 
     def goal(angle: jax.Array) -> jax.Array:
         return jnp.linalg.norm(C @ rotvec_to_matrix(jnp.array([1.0, 0.0, 0.0]) * angle) @ f_b - f_n)
 
-    before, after = jax.grad(goal)(-1e-6), jax.grad(goal)(1e-6)
-    return float(before), float(after)
+    return jax.vmap(jax.grad(goal))(angles)
 
 
-def equation_findings() -> list[Finding]:
+def equation_findings(found: list[Equation]) -> list[Finding]:
     """What the audit of the equations found."""
-    found = equations()
     r = exact_readings("windsurfer")
     ranks = {motion: rank(exact_readings(motion)) for motion in MOTIONS}
     means = {motion: mean_error(motion) for motion in MOTIONS}

@@ -1,6 +1,7 @@
 """The equations audited, every way to an attitude in one table, sweeps, basins, and the paper's question answered."""
 
 import tomllib
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 import jax
@@ -17,7 +18,8 @@ from papers_repro.chalko2010.equations import EXACT, equation_findings, equation
 from papers_repro.chalko2010.experiments import exact_readings, simulated_recording
 from papers_repro.chalko2010.pictures import COLORS, draw_basins, draw_minute, draw_sweeps, draw_turning
 from papers_repro.chalko2010.strategies import gyro_windows, levenberg
-from papers_repro.comparison import Comparison, Finding, Report, compare_bound
+from papers_repro.comparison import Comparison, Finding, Output, Report, compare_bound
+from papers_repro.progress import stage
 
 FOLDER = Path(__file__).parent
 BASIN_POINTS = 37
@@ -30,47 +32,83 @@ Tables = dict[str, pd.DataFrame]
 Sweeps = dict[tuple[str, str], dict[str, instruments.Errors]]
 
 
-def reproduce(output: Path) -> Report:
+def reproduce(output: Path) -> Iterator[Report]:
     """All of it; pictures, attitudes.csv and sweeps.csv go to `output`."""
     with jax.enable_x64(True):
-        return _report(output)
+        yield from _parts(output)
 
 
-def _report(output: Path) -> Report:
+def _parts(output: Path) -> Iterator[Report]:
     paper = tomllib.loads((FOLDER / "paper.toml").read_text())
-    simulated: Tables = {recording.name: judge(recording) for recording in simulations()}
-    recordings, missing = real_recordings()
-    real: Tables = {recording.name: judge(recording) for recording in recordings}
-    swept: Sweeps = {}
-    for motion in COLORS:
-        readings = exact_readings(motion)
-        swept |= {(motion, name): instruments.sweep(readings, name) for name in instruments.SWEEPS}
-    turning = instruments.turning_sweep(instruments.FREQUENCIES)
-    around = basins(BASIN_POINTS)
-
-    pd.concat(simulated | real, names=["recording", "way"]).to_csv(output / "attitudes.csv")
-    _sweep_table(swept, turning).to_csv(output / "sweeps.csv", index=False)
-    draw_basins(around, output / "basins.png")
-    draw_sweeps(swept, output / "sweeps.png")
-    draw_turning(instruments.FREQUENCIES, turning, output / "turning.png")
-    draw_minute(*_minute(), output / "windsurfer_minute.png")
-
-    exact = [equation for equation in equations() if equation.left_over < EXACT]
-    rounding = max(equation.left_over for equation in exact)
-    return Report(
-        title=f"{paper['author']} ({paper['year']}): {paper['title']}",
+    with stage("equations"):
+        found = equations()
+        exact = [equation for equation in found if equation.left_over < EXACT]
+        rounding = max(equation.left_over for equation in exact)
+        audited = Report(
+            title=f"{paper['author']} ({paper['year']}): {paper['title']}",
+            findings=equation_findings(found),
+            remarks=[
+                *paper["remarks"],
+                f"Equations {', '.join(e.number for e in exact)} hold as printed, to {rounding:.0e}.",
+            ],
+        )
+    yield audited
+    simulated = _judged(simulations(), "simulated")
+    yield Report(
+        title="Every way to an attitude, simulated",
         comparisons=_bounds(simulated),
-        findings=[*equation_findings(), *_answers(simulated, swept, turning, around)],
         tables=paper["tables"],
-        remarks=[
-            *paper["remarks"],
-            f"Equations {', '.join(e.number for e in exact)} hold as printed, to {rounding:.0e}.",
-            *missing,
-            *_lines("simulated, truth known", simulated),
-            *_lines("real", real),
-            paper["answer"],
+        remarks=_lines("simulated, truth known", simulated),
+    )
+    recordings, missing = real_recordings()
+    real = _judged(recordings, "real")
+    pd.concat(simulated | real, names=["recording", "way"]).to_csv(output / "attitudes.csv")
+    draw_minute(*_minute(), output / "windsurfer_minute.png")
+    yield Report(
+        title="Every way to an attitude, on real recordings",
+        remarks=[*missing, *_lines("real", real)],
+        outputs=[
+            Output(element="Eqs. (3) to (5)", file="attitudes.csv", holds="errors of every way to an attitude"),
+            Output(element="Eqs. (3) to (5)", file="windsurfer_minute.png", holds="a minute of it, at full rate"),
         ],
     )
+    swept: Sweeps = {}
+    with stage("sweeps of the instruments", len(COLORS) * len(instruments.SWEEPS)) as advance:
+        for motion in COLORS:
+            readings = exact_readings(motion)
+            for name in instruments.SWEEPS:
+                swept[motion, name] = instruments.sweep(readings, name)
+                advance()
+    with stage("a turning device"):
+        turning = instruments.turning_sweep(instruments.FREQUENCIES)
+    with stage("initial values all around"):
+        around = basins(BASIN_POINTS)
+    with stage("pictures"):
+        _sweep_table(swept, turning).to_csv(output / "sweeps.csv", index=False)
+        draw_basins(around, output / "basins.png")
+        draw_sweeps(swept, output / "sweeps.png")
+        draw_turning(instruments.FREQUENCIES, turning, output / "turning.png")
+    considerations = "Sampling rate considerations"
+    yield Report(
+        title="The paper's questions answered",
+        findings=_answers(simulated, swept, turning, around),
+        remarks=[paper["answer"]],
+        outputs=[
+            Output(element="Conclusions", file="sweeps.csv", holds="errors by instruments and by turning"),
+            Output(element="Conclusions", file="sweeps.png", holds="errors by instruments"),
+            Output(element=considerations, file="turning.png", holds="errors by the device's turning"),
+            Output(element="Eq. (5), requirement 2", file="basins.png", holds="results from initial values all around"),
+        ],
+    )
+
+
+def _judged(recordings: Iterable[Recording], kind: str) -> Tables:
+    """What each way makes of each recording."""
+    tables = {}
+    for recording in recordings:
+        with stage(f"{recording.name}, {kind}"):
+            tables[recording.name] = judge(recording)
+    return tables
 
 
 def _bounds(simulated: Tables) -> list[Comparison]:

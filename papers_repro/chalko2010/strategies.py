@@ -49,8 +49,12 @@ def left_over(angles: np.ndarray, f_b: np.ndarray, f_n: np.ndarray) -> np.ndarra
     return np.array([cy * x - sy * y - f_n[0], sy * x + cy * y - f_n[1], z - f_n[2]])
 
 
+@jax.jit
 def initial_values(epochs: Epochs) -> jax.Array:
     return euler_to_matrix(epochs.euler0)
+
+
+_matrices = jax.jit(euler_to_matrix)
 
 
 def minpack(epochs: Epochs) -> jax.Array:
@@ -58,7 +62,7 @@ def minpack(epochs: Epochs) -> jax.Array:
     found = []
     for f_b, f_n, start in zip(*(np.asarray(x) for x in (epochs.f_b_mean, epochs.f_n, epochs.euler0)), strict=True):
         found.append(least_squares(left_over, start, args=(f_b, f_n), method="lm", x_scale="jac").x)
-    return euler_to_matrix(jnp.asarray(found))
+    return _matrices(np.array(found))
 
 
 @jax.jit
@@ -93,7 +97,7 @@ def previous_epoch(epochs: Epochs) -> jax.Array:
 
 def windows(epochs: Epochs) -> jax.Array:
     """Neighbouring epochs share an attitude."""
-    return _windows(epochs, epochs.f_b_mean, jnp.broadcast_to(jnp.eye(3), epochs.turned_middle.shape))
+    return _windows(epochs, epochs.f_b_mean, np.broadcast_to(np.eye(3), epochs.turned_middle.shape))
 
 
 def gyro_windows(epochs: Epochs) -> jax.Array:
@@ -101,9 +105,9 @@ def gyro_windows(epochs: Epochs) -> jax.Array:
     return _windows(epochs, epochs.f_b_carried, epochs.turned_middle)
 
 
-def _windows(epochs: Epochs, f_b: jax.Array, C_gyro: jax.Array) -> jax.Array:
+def _windows(epochs: Epochs, f_b: jax.Array, C_gyro: jax.Array | np.ndarray) -> jax.Array:
     count = f_b.shape[:1]
-    prior_std, measurement_std = jnp.full(count, FREE), jnp.full(count, MEASUREMENT_STD)
+    prior_std, measurement_std = np.full(count, FREE), np.full(count, MEASUREMENT_STD)
     return fit_windows(f_b, epochs.f_n, initial_values(epochs), prior_std, measurement_std, WINDOW, C_gyro).C_nb
 
 

@@ -1,6 +1,7 @@
 """Elevation on real drives: each method raw, with constants fitted on a part, and with surveyed heights."""
 
 import warnings
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,8 @@ from altijax.datasets import DatasetNotFoundError, load_dataset
 from altijax.estimates import calibrate, estimate_elevation, score_elevation
 from altijax.plots import plot_elevation, plot_elevation_error
 from altijax.recordings import Recording, RecordingWarning
-from papers_repro.comparison import Comparison, Report, compare_bound
+from papers_repro.comparison import Comparison, Output, Report, compare_bound
+from papers_repro.progress import stage
 
 TABLE = "elevation"
 
@@ -62,63 +64,76 @@ CASES = [
 ]
 
 
-def reproduce(output: Path) -> Report:
+def reproduce(output: Path) -> Iterator[Report]:
     """Every case whose drive is here; elevation.csv and a picture a drive go to `output`."""
-    rows, missing = [], []
+    title = "Elevation from accelerometer and speed sensor on real drives"
+    rows = []
     for drive in dict.fromkeys(case.drive for case in CASES):
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RecordingWarning)  # a damaged file that no method here reads
                 recording = load_dataset(drive)
         except DatasetNotFoundError:
-            missing.append(
-                f"{drive} was not run, as it is not here: altijax.load_dataset({drive!r}) says what to put where."
+            yield Report(
+                title=f"{title}: {drive}",
+                remarks=[
+                    f"{drive} was not run, as it is not here: altijax.load_dataset({drive!r}) says what to put where."
+                ],
             )
             continue
-        estimates = {}
-        for case in (case for case in CASES if case.drive == drive):
-            until = None if case.fitted is None else _start(recording) + case.fitted
-            calibration = (
-                calibrate(recording, case.constants, method=case.method, until=until) if case.constants else None
-            )
-            estimate = estimate_elevation(
-                recording, method=case.method, calibration=calibration, known_heights=_known(recording, case)
-            )
-            score = score_elevation(estimate, recording)
-            later = score if until is None else score_elevation(estimate, recording, after=until)
-            rows.append(
-                {
-                    "drive": drive,
-                    "method": case.method,
-                    "constants": ", ".join(case.constants) or "nominal" if case.known is None else "given heights",
-                    "fitted on": _seen(case),
-                    "RMS, all (m)": score["rms_without_offset"],
-                    "RMS, held out (m)": later["rms_without_offset"] if until is not None else float("nan"),
-                    "cover 1, 2 std": f"{later['within_1_std']:.2f}, {later['within_2_std']:.2f}",
-                    "end error (m)": score["end_error"],
-                    "relief (m)": score["relief"],
-                    "way (m)": score["way"],
-                    # of an estimate that was given heights nothing is free: what it errs by is its error
-                    "RMS bounded (m)": (later if case.known else score)["rms" if case.known else "rms_without_offset"],
-                    "bound": case.bound,
-                }
-            )
-            if case.fitted in _SHARES:
-                label = ", ".join(case.constants) or "given its heights"
-                estimates[f"{case.method}, {label}"] = estimate
-        _draw(estimates, recording, output / f"{drive}.png")
-    table = pd.DataFrame(rows)
-    table.to_csv(output / "elevation.csv", index=False)
-    return Report(
-        title="Elevation from accelerometer and speed sensor on real drives",
-        comparisons=_comparisons(rows),
-        tables={
-            TABLE: "RMS over the whole drive, height offset removed; where heights are given, over the rest, from "
-            "its first height; bounds set before the figures were "
-            "known, the noise levels of 'fused' with an eye on these two drives"
-        },
-        remarks=[*missing, *_lines(table)],
+        cases = [case for case in CASES if case.drive == drive]
+        estimates, of_drive = {}, []
+        with stage(drive, len(cases)) as advance:
+            for case in cases:
+                estimate, row = _tried(case, recording)
+                of_drive.append(row)
+                if case.fitted in _SHARES:
+                    label = ", ".join(case.constants) or "given its heights"
+                    estimates[f"{case.method}, {label}"] = estimate
+                advance()
+            _draw(estimates, recording, output / f"{drive}.png")
+        rows += of_drive
+        pd.DataFrame(rows).to_csv(output / "elevation.csv", index=False)
+        yield Report(
+            title=f"{title}: {drive}",
+            comparisons=_comparisons(of_drive),
+            tables={
+                TABLE: "RMS over the whole drive, height offset removed; where heights are given, over the rest, from "
+                "its first height; bounds set before the figures were "
+                "known, the noise levels of 'fused' with an eye on these two drives"
+            },
+            remarks=_lines(pd.DataFrame(of_drive)),
+            outputs=[
+                Output(element=drive, file="elevation.csv", holds="errors of every method"),
+                Output(element=drive, file=f"{drive}.png", holds="elevations and their errors"),
+            ],
+        )
+
+
+def _tried(case: Case, recording: Recording) -> tuple[pd.DataFrame, dict]:
+    """The estimate of a case, and its row of the table."""
+    until = None if case.fitted is None else _start(recording) + case.fitted
+    calibration = calibrate(recording, case.constants, method=case.method, until=until) if case.constants else None
+    estimate = estimate_elevation(
+        recording, method=case.method, calibration=calibration, known_heights=_known(recording, case)
     )
+    score = score_elevation(estimate, recording)
+    later = score if until is None else score_elevation(estimate, recording, after=until)
+    return estimate, {
+        "drive": case.drive,
+        "method": case.method,
+        "constants": ", ".join(case.constants) or "nominal" if case.known is None else "given heights",
+        "fitted on": _seen(case),
+        "RMS, all (m)": score["rms_without_offset"],
+        "RMS, held out (m)": later["rms_without_offset"] if until is not None else float("nan"),
+        "cover 1, 2 std": f"{later['within_1_std']:.2f}, {later['within_2_std']:.2f}",
+        "end error (m)": score["end_error"],
+        "relief (m)": score["relief"],
+        "way (m)": score["way"],
+        # of an estimate that was given heights nothing is free: what it errs by is its error
+        "RMS bounded (m)": (later if case.known else score)["rms" if case.known else "rms_without_offset"],
+        "bound": case.bound,
+    }
 
 
 def _known(recording: Recording, case: Case) -> pd.DataFrame | None:
@@ -162,8 +177,6 @@ def _comparisons(rows: list[dict]) -> list[Comparison]:
 
 
 def _lines(table: pd.DataFrame) -> list[str]:
-    if table.empty:
-        return []
     shown = table.drop(columns=["bound", "way (m)", "relief (m)", "RMS bounded (m)"])
     shown = shown.replace(
         {"constants": {", ".join(_NORM): "bias_z, initial v_z", ", ".join(_CAR): "bias_x, weight tr."}}

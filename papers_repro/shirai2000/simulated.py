@@ -1,7 +1,7 @@
 """The experiments simulated: printed rows placed among them, claims decided, charts drawn."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,9 +10,10 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.axes import Axes
 
-from papers_repro.comparison import Comparison, Finding, compare_bound
+from papers_repro.comparison import Comparison, Finding, Output, Report, compare_bound
+from papers_repro.progress import stage
 from papers_repro.shirai2000.bands import Cell, cells, comparisons, table_lines, uniformity
-from papers_repro.shirai2000.charts import FIGURES, actual_profile, plot_budget, plot_running_through
+from papers_repro.shirai2000.charts import FIGURES, TITLES, actual_profile, plot_budget, plot_running_through
 from papers_repro.shirai2000.claims import claims, repeated_errors
 from papers_repro.shirai2000.drift import budget_comparisons, budget_lines, developments, drift, rms_of, shares
 from papers_repro.shirai2000.inference import NAMES, PRIORS, SCALE, Posterior
@@ -20,33 +21,41 @@ from papers_repro.shirai2000.study import RUNS, Study, study
 from papers_repro.shirai2000.tables import Row, number
 
 
-def simulated(
-    rows: Sequence[Row], paper: dict[str, Any], output: Path
-) -> tuple[list[str], list[Comparison], list[Finding]]:
-    """Lines to read, comparisons and findings; pictures and bands.csv go to `output`."""
+def simulated(rows: Sequence[Row], paper: dict[str, Any], output: Path) -> Iterator[Report]:
+    """Tables and figures as simulated, then the error budget; pictures and bands.csv go to `output`."""
     found = study(rows)
     placed = cells(rows, found.names, found.profiles[:, :, -1])
-    _draw(found, rows, output)
     _write_bands(placed, output / "bands.csv")
-    lines = [
-        "",
-        f"Simulated: {RUNS} runs of every experiment, its sensors inferred from all other experiments.",
-        *table_lines(placed, paper["tables"]),
-        "",
-        *coverage_lines(placed),
-        "",
-        *budget_lines(found),
-    ]
-    return (
-        lines,
-        [*comparisons(placed), *_judged(placed), *budget_comparisons(found)],
-        [
+    with stage("figures 9 to 14"):
+        figures = _draw_charts(found, rows, output)
+    tables = paper["simulated_tables"]
+    yield Report(
+        title=f"Tables 1 to 5 simulated: {RUNS} runs of every experiment, its sensors inferred from all others",
+        comparisons=[*comparisons(placed), *_judged(placed)],
+        findings=[
             *inference_findings(found.posterior),
             *claims(repeated_errors(found.experiments, found.profiles[:, :, -1]), paper),
-            *drift(found),
-            *developments(found),
+        ],
+        tables={name: line for name, line in tables.items() if name != "budget"},
+        remarks=[*table_lines(placed, paper["tables"]), "", *coverage_lines(placed)],
+        outputs=[
+            *(
+                Output(element=f"Table {table}", file="bands.csv", holds="each measurement among simulated ones")
+                for table in paper["tables"]
+            ),
+            *figures,
         ],
     )
+    with stage("error budget"):
+        budget = Report(
+            title="Why the elevation drifts",
+            comparisons=budget_comparisons(found),
+            findings=[*drift(found), *developments(found)],
+            tables={"budget": tables["budget"]},
+            remarks=budget_lines(found),
+            outputs=_draw_budgets(found, output),
+        )
+    yield budget
 
 
 def coverage_lines(placed: Sequence[Cell]) -> list[str]:
@@ -129,23 +138,42 @@ def plot_experiment(found: Study, rows: Sequence[Row], chain: str, course: str, 
     plot_running_through(title, chain, profiles, actual, printed, ax)
 
 
-def _draw(found: Study, rows: Sequence[Row], output: Path) -> None:
-    pictures = {
-        f"figure_{figure}": (f"Fig. {figure}, {course}", chain, course)
-        for chain, figures in FIGURES.items()
-        for figure, course in zip(figures, ("descent", "ascent"), strict=True)
-    }
-    pictures |= {f"indoors_{chain}": ("indoors", chain, "level") for chain in ("vibration_gyro", "vehicle_speed")}
-    for name, (title, chain, course) in pictures.items():
-        figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
-        plot_experiment(found, rows, chain, course, title, ax)
-        figure.savefig(output / f"{name}.png", dpi=120)
-        plt.close(figure)
+def _draw_charts(found: Study, rows: Sequence[Row], output: Path) -> list[Output]:
+    """Figures 9 to 14, and the same charts of the passage, which the paper does not show."""
+    outputs = []
+    for chain, figures in FIGURES.items():
+        for figure_number, course in zip(figures, ("descent", "ascent"), strict=True):
+            outputs.append(
+                Output(
+                    element=f"Fig. {figure_number}",
+                    file=f"figure_{figure_number}.png",
+                    holds=f"{TITLES[chain]}, {course}",
+                )
+            )
+            _draw_chart(found, rows, chain, course, f"Fig. {figure_number}, {course}", output / outputs[-1].file)
+    for chain in ("vibration_gyro", "vehicle_speed"):
+        table = next(row["table"] for row in rows if row["sensor"] == chain and row["course"] == "level")
+        outputs.append(Output(element=f"Table {table}", file=f"indoors_{chain}.png", holds="running-through chart"))
+        _draw_chart(found, rows, chain, "level", "indoors", output / outputs[-1].file)
+    return outputs
+
+
+def _draw_chart(found: Study, rows: Sequence[Row], chain: str, course: str, title: str, path: Path) -> None:
+    figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    plot_experiment(found, rows, chain, course, title, ax)
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+
+
+def _draw_budgets(found: Study, output: Path) -> list[Output]:
+    outputs = []
     for place in found.courses:
         figure, axes = plt.subplots(1, 3, figsize=(12, 4.5), sharey=True, layout="constrained")
         plot_budget(shares(found, place), *rms_of(found, place), axes)
         figure.savefig(output / f"budget_{place}.png", dpi=120)
         plt.close(figure)
+        outputs.append(Output(element="elevation", file=f"budget_{place}.png", holds=f"error by source, {place}"))
+    return outputs
 
 
 def _write_bands(placed: Sequence[Cell], path: Path) -> None:

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from papers_repro.progress import stage
 from papers_repro.shirai2000.bands import drawn_sensors, simulate
 from papers_repro.shirai2000.budget import Responses, responses
 from papers_repro.shirai2000.experiments import Course, Sensors, sample_count
@@ -71,16 +72,14 @@ def study(rows: Sequence[Row], runs: int = RUNS, response_runs: dict[str, int] =
     key = jax.random.key(1, impl="rbg")
     with jax.enable_x64(True):
         exact = partial(jnp.asarray, dtype=jnp.float64)
-        sites = {
-            place: site_of(
-                jax.tree.map(exact, course),
-                jax.tree.map(exact, _in_parts(found, course, jax.random.split(key, response_runs[place]))),
+        sites = {}
+        for place, course in courses.items():
+            part = _in_parts(found, course, jax.random.split(key, response_runs[place]), place)
+            sites[place] = site_of(jax.tree.map(exact, course), jax.tree.map(exact, part))
+        with stage("sensors inferred from the printed rows"):
+            posterior, without = infer(
+                jax.tree.map(jnp.asarray, experiments), (sites["outdoors"], sites["indoors"]), jax.random.key(0)
             )
-            for place, course in courses.items()
-        }
-        posterior, without = infer(
-            jax.tree.map(jnp.asarray, experiments), (sites["outdoors"], sites["indoors"]), jax.random.key(0)
-        )
     at_mode = [place for place, times in REPEATS.items() for _ in range(times)]
     certain = Posterior(mode=posterior.mode, covariance=1e-12 * np.eye(len(NAMES)))
     sensors = drawn_sensors(
@@ -90,7 +89,10 @@ def study(rows: Sequence[Row], runs: int = RUNS, response_runs: dict[str, int] =
     )
     everything = jax.tree.map(lambda x: jnp.concatenate([x, x[jnp.array([index[p] for p in at_mode])]]), of_all)
     keys = jax.random.split(jax.random.key(2, impl="rbg"), (len(names) + len(at_mode)) * runs)
-    profiles = np.asarray(simulate(sensors, everything, keys.reshape(len(names) + len(at_mode), runs), samples=samples))
+    with stage("runs of every experiment"):
+        profiles = np.asarray(
+            simulate(sensors, everything, keys.reshape(len(names) + len(at_mode), runs), samples=samples)
+        )
     return Study(
         names=names,
         experiments=experiments,
@@ -111,8 +113,13 @@ def mode_sensors(found: Study, place: str) -> Sensors:
 
 
 def _in_parts(
-    function: Callable[[Course, jax.Array], Responses], course: Course, keys: jax.Array, size: int = 16
+    function: Callable[[Course, jax.Array], Responses], course: Course, keys: jax.Array, place: str, size: int = 16
 ) -> Responses:
     """Over keys in parts of one size, as memory and a single compilation ask for."""
-    parts = [function(course, keys[i : i + size]) for i in range(0, keys.shape[0], size)]
+    starts = range(0, keys.shape[0], size)
+    parts = []
+    with stage(f"derivatives of runs, {place}", len(starts)) as advance:
+        for start in starts:
+            parts.append(jax.tree.map(np.asarray, function(course, keys[start : start + size])))
+            advance()
     return jax.tree.map(lambda *x: np.concatenate(x), *parts)

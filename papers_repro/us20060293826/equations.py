@@ -80,61 +80,51 @@ class Equation:
     corrected: float = inf
 
 
+# What each says and its unit, by its number.
+PRINTED = {
+    "1": ("theta' = w_Y cos(phi) - w_Z sin(phi)", "rad/s"),
+    "2": ("phi' = w_X + w_Y sin(phi) tan(theta) + w_Z cos(phi) tan(theta)", "rad/s"),
+    "4": ("f_X = a_X + g sin(theta) - w_Z V_Y + w_Y V_Z", "m/s^2"),
+    "5": ("f_Y = a_Y - g sin(phi) cos(theta) + w_Z V_X + w_X V_Z", "m/s^2"),
+    "7": ("theta = theta_0 + integral of w_Y cos(phi) - w_Y sin(phi)", "rad/s"),
+    "11": ("theta' = w_Y cos(theta) - w_Z sin(phi)", "rad/s"),
+}
+CORRECTIONS = {"5": "- w_X V_Z", "7": "- w_Z sin(phi)", "11": "w_Y cos(phi)"}
+
+
 def equations() -> list[Equation]:
     """Every equation that the motion can decide."""
-    m = slipping_motion()
-    (f_x, f_y, _), (w_x, w_y, w_z), (v_x, v_y, v_z), (a_x, a_y, _) = m.f, m.w, m.v, m.a
-    sin_r, cos_r, sin_p, cos_p = jnp.sin(m.roll), jnp.cos(m.roll), jnp.sin(m.pitch), jnp.cos(m.pitch)
-    tan_p = sin_p / cos_p
-
-    def rms(rest: jax.Array) -> float:
-        return float(jnp.sqrt(jnp.mean(rest * rest)))
-
-    lateral = f_y - (a_y - G * sin_r * cos_p + w_z * v_x)
+    printed, corrected = _left_over(slipping_motion())
     return [
         Equation(
-            number="1",
-            text="theta' = w_Y cos(phi) - w_Z sin(phi)",
-            unit="rad/s",
-            printed=rms(m.pitch_rate - (w_y * cos_r - w_z * sin_r)),
-        ),
-        Equation(
-            number="2",
-            text="phi' = w_X + w_Y sin(phi) tan(theta) + w_Z cos(phi) tan(theta)",
-            unit="rad/s",
-            printed=rms(m.roll_rate - (w_x + (w_y * sin_r + w_z * cos_r) * tan_p)),
-        ),
-        Equation(
-            number="4",
-            text="f_X = a_X + g sin(theta) - w_Z V_Y + w_Y V_Z",
-            unit="m/s^2",
-            printed=rms(f_x - (a_x + G * sin_p - w_z * v_y + w_y * v_z)),
-        ),
-        Equation(
-            number="5",
-            text="f_Y = a_Y - g sin(phi) cos(theta) + w_Z V_X + w_X V_Z",
-            unit="m/s^2",
-            printed=rms(lateral - w_x * v_z),
-            correction="- w_X V_Z",
-            corrected=rms(lateral + w_x * v_z),
-        ),
-        Equation(
-            number="7",
-            text="theta = theta_0 + integral of w_Y cos(phi) - w_Y sin(phi)",
-            unit="rad/s",
-            printed=rms(m.pitch_rate - (w_y * cos_r - w_y * sin_r)),
-            correction="- w_Z sin(phi)",
-            corrected=rms(m.pitch_rate - (w_y * cos_r - w_z * sin_r)),
-        ),
-        Equation(
-            number="11",
-            text="theta' = w_Y cos(theta) - w_Z sin(phi)",
-            unit="rad/s",
-            printed=rms(m.pitch_rate - (w_y * cos_p - w_z * sin_r)),
-            correction="w_Y cos(phi)",
-            corrected=rms(m.pitch_rate - (w_y * cos_r - w_z * sin_r)),
-        ),
+            number=number,
+            text=text,
+            unit=unit,
+            printed=float(printed[number]),
+            correction=CORRECTIONS.get(number, ""),
+            corrected=float(corrected.get(number, inf)),
+        )
+        for number, (text, unit) in PRINTED.items()
     ]
+
+
+@jax.jit
+def _left_over(m: Motion) -> tuple[dict[str, jax.Array], dict[str, jax.Array]]:
+    """What the equations leave over as printed, and those of them that need it with their correction."""
+    (f_x, f_y, _), (w_x, w_y, w_z), (v_x, v_y, v_z), (a_x, a_y, _) = m.f, m.w, m.v, m.a
+    sin_r, cos_r, sin_p, cos_p = jnp.sin(m.roll), jnp.cos(m.roll), jnp.sin(m.pitch), jnp.cos(m.pitch)
+    pitching = m.pitch_rate - (w_y * cos_r - w_z * sin_r)
+    lateral = f_y - (a_y - G * sin_r * cos_p + w_z * v_x)
+    printed = {
+        "1": pitching,
+        "2": m.roll_rate - (w_x + (w_y * sin_r + w_z * cos_r) * sin_p / cos_p),
+        "4": f_x - (a_x + G * sin_p - w_z * v_y + w_y * v_z),
+        "5": lateral - w_x * v_z,
+        "7": m.pitch_rate - (w_y * cos_r - w_y * sin_r),
+        "11": m.pitch_rate - (w_y * cos_p - w_z * sin_r),
+    }
+    corrected = {"5": lateral + w_x * v_z, "7": pitching, "11": pitching}
+    return jax.tree.map(lambda rest: jnp.sqrt(jnp.mean(rest * rest)), (printed, corrected))
 
 
 def equation_findings(found: list[Equation]) -> list[Finding]:

@@ -160,6 +160,7 @@ def simulate(drive: Drive, gyro_quality: jax.Array, key: jax.Array, *, runs: int
     )
 
 
+@jax.jit
 def rms_errors(runs: Runs) -> dict[str, jax.Array]:
     """RMS difference from the GPS speed of each run (runs,), by method."""
     return {name: jnp.sqrt(jnp.mean(error**2, -1)) for name, error in runs.errors.items()}

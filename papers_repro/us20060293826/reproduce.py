@@ -2,14 +2,15 @@
 
 import csv
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from papers_repro.comparison import Comparison, Finding, Report, compare_bound
+from papers_repro.comparison import Comparison, Finding, Output, Report, compare_bound
+from papers_repro.progress import stage
 from papers_repro.us20060293826.equations import EXACT, equation_findings, equations, unexplained
 from papers_repro.us20060293826.experiments import METHODS, Runs, figure_drives, rms_errors, simulate, winding_drive
 from papers_repro.us20060293826.outages import real_outages
@@ -22,59 +23,94 @@ QUALITIES = (0.1, 0.3, 1.0, 3.0)
 SWINGS = (0.25, 0.5, 1.0, 1.5, 2.0, 3.0)
 
 
-def reproduce(output: Path) -> Report:
+def reproduce(output: Path) -> Iterator[Report]:
     """Both figures, the map, the growth of errors, real outages; pictures, errors.csv, outages.csv go to `output`."""
     with jax.enable_x64(True):
-        return _report(output)
+        yield from _parts(output)
 
 
-def _report(output: Path) -> Report:
+def _parts(output: Path) -> Iterator[Report]:
     paper = tomllib.loads((FOLDER / "paper.toml").read_text())
-    checked = equations()
-    figures = {
-        (name, quality): simulate(drive, jnp.asarray(quality), jax.random.key(number), runs=RUNS)
-        for number, (name, drive) in enumerate(figure_drives().items())
-        for quality in (0.1, 1.0)
-    }
-    turning, better = _map_of_benefit()
-    growth = error_growth(curvy_drive())
-    for name in figure_drives():
-        draw_figure(name, figures[name, 1.0], output / f"{name.replace(' ', '_')}.png")
-    draw_map(turning, QUALITIES, better, output / "where_the_roll_helps.png")
-    draw_growth(growth, output / "error_growth.png")
-    _write_errors(figures, output / "errors.csv")
-    exact = [equation for equation in checked if equation.printed < EXACT]
-    return Report(
+    with stage("equations"):
+        checked = equations()
+        exact = [equation for equation in checked if equation.printed < EXACT]
+    yield Report(
         title=f"{paper['number']} ({paper['year']}): {paper['title']}",
-        comparisons=[*_claims(figures), *_laws(growth)],
-        findings=[
-            *equation_findings(checked),
-            *_smallness(figures),
-            *_stability(growth),
-            _region(turning, better),
-        ],
-        tables=paper["tables"],
+        findings=equation_findings(checked),
         remarks=[
             *paper["remarks"],
             f"Equations {', '.join(e.number for e in exact)} hold as printed, to {max(e.printed for e in exact):.0e}; "
             f"no correction found for: {', '.join(unexplained(checked)) or 'none'}.",
-            *_error_lines(figures),
-            *real_outages(output),
         ],
+    )
+    with stage("figures 6 and 7"):
+        figures = {
+            (name, quality): simulate(drive, jnp.asarray(quality), jax.random.key(number), runs=RUNS)
+            for number, (name, drive) in enumerate(figure_drives().items())
+            for quality in (0.1, 1.0)
+        }
+        for name in figure_drives():
+            draw_figure(name, figures[name, 1.0], output / f"{name.replace(' ', '_')}.png")
+        _write_errors(figures, output / "errors.csv")
+    yield Report(
+        title="Figures 6 and 7 as simulated experiments",
+        comparisons=_claims(figures),
+        findings=_smallness(figures),
+        tables={"figures": paper["tables"]["figures"]},
+        remarks=_error_lines(figures),
+        outputs=[
+            Output(element="Fig. 6", file="figure_6.png", holds="speed without and with the roll"),
+            Output(element="Fig. 7", file="figure_7.png", holds="speed without and with the roll"),
+            Output(element="Figs. 6 and 7", file="errors.csv", holds="errors of every run"),
+        ],
+    )
+    with stage("growth of errors"):
+        growth = error_growth(curvy_drive())
+        draw_growth(growth, output / "error_growth.png")
+    yield Report(
+        title="Stability of the loop",
+        comparisons=_laws(growth),
+        findings=_stability(growth),
+        tables={"stability": paper["tables"]["stability"]},
+        outputs=[Output(element="Eqs. (10) to (12)", file="error_growth.png", holds="growth of errors with turning")],
+    )
+    turning, better = _map_of_benefit()
+    draw_map(turning, QUALITIES, better, output / "where_the_roll_helps.png")
+    yield Report(
+        title="Where the roll helps",
+        findings=[_region(turning, better)],
+        outputs=[
+            Output(
+                element="claim of many curves",
+                file="where_the_roll_helps.png",
+                holds="share of runs made better, by turning and gyros",
+            )
+        ],
+    )
+    with stage("real outages"):
+        lines = real_outages(output)
+    yield Report(
+        title="On a real drive",
+        remarks=lines,
+        outputs=[Output(element="claim of accuracy", file="outages.csv", holds="errors after outages of the GNSS")]
+        if (output / "outages.csv").exists()
+        else [],
     )
 
 
 def _map_of_benefit() -> tuple[np.ndarray, np.ndarray]:
     """Accumulated change of heading (swings,), and the share of runs that the roll made better (qualities, swings)."""
     turning, better = [], []
-    for swing in SWINGS:
-        drive = winding_drive((swing * 0.16, swing * 0.10), 700.0)
-        shares = []
-        for quality in QUALITIES:
-            runs = simulate(drive, jnp.asarray(quality), jax.random.key(100), runs=RUNS)
-            shares.append(_share_better(runs))
-        turning.append(float(runs.turning[-1]))
-        better.append(shares)
+    with stage("map of where the roll helps", len(SWINGS) * len(QUALITIES)) as advance:
+        for swing in SWINGS:
+            drive = winding_drive((swing * 0.16, swing * 0.10), 700.0)
+            shares = []
+            for quality in QUALITIES:
+                runs = simulate(drive, jnp.asarray(quality), jax.random.key(100), runs=RUNS)
+                shares.append(_share_better(runs))
+                advance()
+            turning.append(float(runs.turning[-1]))
+            better.append(shares)
     return np.array(turning), np.array(better).T
 
 
