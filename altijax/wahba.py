@@ -124,14 +124,13 @@ def fit_shared_attitude(
     return _fit(sums, _elements(C_nb0), require_shape("prior_std", prior_std, (...,)))
 
 
-@partial(jax.jit, static_argnames="window")
 def fit_windows(
     f_b: ArrayLike,
     f_n: ArrayLike,
     C_nb0: ArrayLike,
     prior_std: ArrayLike,
     measurement_std: ArrayLike,
-    window: int = 9,
+    window: int | jax.Array = 9,
     C_gyro: ArrayLike | None = None,
 ) -> SharedAttitude:
     """Attitude at each epoch from the `window` epochs around it, fewer at the ends.
@@ -157,7 +156,7 @@ def fit_windows(
     measurement_std : (..., time) m/s^2
         Standard deviation of each component of ``f_n - C_nb f_b``; infinite where an epoch is missing.
     window : int, optional
-        Epochs that share an attitude, an odd number.
+        Epochs that share an attitude, an odd number; may be traced.
     C_gyro : (..., time, 3, 3), optional
         Attitude at mid-epoch by gyros alone, from any start, as of `integrate_attitude`.
 
@@ -171,8 +170,26 @@ def fit_windows(
     ValueError
         If the shapes do not fit or `window` is not a positive odd number.
     """
-    if window < 1 or window % 2 == 0:
-        raise ValueError(f"window must be a positive odd number of epochs, got {window}")
+    longest = 2 * jnp.shape(f_b)[-2] + 1
+    if not isinstance(window, jax.Array):
+        if window < 1 or window % 2 == 0:
+            raise ValueError(f"window must be a positive odd number of epochs, got {window}")
+        # Windows of as many binary digits share what is compiled.
+        longest = min(longest, 2 ** int(window).bit_length() - 1)
+    return _fit_windows(f_b, f_n, C_nb0, prior_std, measurement_std, window, C_gyro, longest)
+
+
+@partial(jax.jit, static_argnames="longest")
+def _fit_windows(
+    f_b: ArrayLike,
+    f_n: ArrayLike,
+    C_nb0: ArrayLike,
+    prior_std: ArrayLike,
+    measurement_std: ArrayLike,
+    window: jax.Array,
+    C_gyro: ArrayLike | None,
+    longest: int,
+) -> SharedAttitude:
     f_b = require_shape("f_b", f_b, (..., None, 3))
     time = f_b.shape[-2]
     f_n = require_shape("f_n", f_n, (..., time, 3))
@@ -184,8 +201,9 @@ def fit_windows(
         carry = _elements(require_shape("C_gyro", C_gyro, (..., time, 3, 3)))
         force, prior = _apply(carry, force), _product(prior, _transpose(carry))
     moments = _moments(force, _components(f_n), measurement_std)
-    sums = jax.tree.map(lambda x: _sliding_sum(x, window), moments)
-    return _fit(sums, prior, prior_std, None if C_gyro is None else carry)
+    leaves, structure = jax.tree.flatten(moments)
+    sums = _sliding_sum(jnp.stack(jnp.broadcast_arrays(*leaves)), window, longest)
+    return _fit(jax.tree.unflatten(structure, list(sums)), prior, prior_std, None if C_gyro is None else carry)
 
 
 def _moments(f_b: Vector, f_n: Vector, measurement_std: jax.Array) -> tuple[Matrix, Matrix, jax.Array, jax.Array]:
@@ -197,19 +215,19 @@ def _moments(f_b: Vector, f_n: Vector, measurement_std: jax.Array) -> tuple[Matr
     return cross, own, w * _dot(f_b, f_b), (w > 0).astype(w.dtype)
 
 
-def _sliding_sum(x: jax.Array, window: int) -> jax.Array:
-    """Sum of the `window` elements around each one along the last axis."""
-    n = x.shape[-1]
-    x = jnp.pad(x, [(0, 0)] * (x.ndim - 1) + [(window // 2, window // 2)])
+def _sliding_sum(x: jax.Array, window: jax.Array, longest: int) -> jax.Array:
+    """Sum of the `window` elements around each one along the last axis; `longest` is known when compiling."""
+    n, half = x.shape[-1], longest // 2
+    window = jnp.minimum(window, longest)
+    x = jnp.pad(x, [(0, 0)] * (x.ndim - 1) + [(half, half)])
     # Sums of 1, 2, 4, ... elements, put together as the binary digits of `window` say: no cumulative sum, whose
     # differences lose the digits of a long record.
-    total, start, length = jnp.zeros_like(x[..., :n]), 0, 1
+    total, start, length = jnp.zeros_like(x[..., :n]), half - window // 2, 1
     while True:
-        if window & length:
-            total = total + x[..., start : start + n]
-            start += length
-        length *= 2
-        if length > window:
+        digit = window & length
+        total = total + jnp.where(digit, jax.lax.dynamic_slice_in_dim(x, start, n, -1), 0)
+        start, length = start + digit, 2 * length
+        if length > longest:
             return total
         x = x[..., : -length // 2] + x[..., length // 2 :]
 

@@ -2,10 +2,8 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
-from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 from scipy.optimize import minimize
@@ -13,12 +11,13 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import imu_of, start_of
-from altijax.motion_estimate.intervals import MotionReadings, instants_at
+from altijax.motion_estimate.intervals import MotionReadings
 from altijax.motion_estimate.model import MotionNoise, Trajectory
 from altijax.motion_estimate.readings import motion_readings
 from altijax.motion_estimate.smoother import MotionFit, MotionPrior, motion_between, motion_pass
 from altijax.motion_estimate.start import window_attitudes
 from altijax.recordings import Recording
+from altijax.stages import Stages, stages
 
 MOTION_METHODS = ("epoch", "window", "batch")
 
@@ -130,12 +129,12 @@ def estimate_motion(
     beliefs = _beliefs(calibration)
     recording = replace(recording, imu=correct_imu(imu_of(recording), calibration))
     use_gyro = use_gyro and method != "epoch" and "gx" in imu_of(recording)
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), stages(f"motion of {recording.name} by {method}") as stage:
         if method == "batch":
-            return _batch_estimate(recording, *_found_batch(recording, use_gyro, wind, delay, beliefs))
+            return _batch_estimate(recording, *_found_batch(recording, use_gyro, wind, delay, beliefs, stage))
         if delay is None and beliefs.delay is not None:
             delay = beliefs.delay[0]
-        return _window_estimate(recording, method, use_gyro, delay)
+        return _window_estimate(recording, method, use_gyro, delay, stage)
 
 
 def _beliefs(calibration: Calibration | None) -> _Beliefs:
@@ -162,64 +161,74 @@ def _beliefs(calibration: Calibration | None) -> _Beliefs:
     )
 
 
-def _window_estimate(recording: Recording, method: str, use_gyro: bool, delay: float | None) -> pd.DataFrame:
+def _window_estimate(
+    recording: Recording, method: str, use_gyro: bool, delay: float | None, stage: Stages
+) -> pd.DataFrame:
     search = delay is None and use_gyro
     first = float(_DELAY if search else delay or 0.0)
-    readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=first)
+    readings = motion_readings(recording, use_gyro=use_gyro, delay=first)
     if search:
-        delay = _delay_by_windows(readings, steps)
-        readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=delay)
+        stage("delay of the GNSS velocities")
+        delay = _delay_by_windows(readings)
+        readings = motion_readings(recording, use_gyro=use_gyro, delay=delay)
     delay = float(delay or 0.0)
+    stage("attitudes by windows of epochs")
     length = {False: _WINDOW_WITHOUT_GYRO, True: _WINDOW}[use_gyro]
     window = 1 if method == "epoch" else _odd(length / float(readings.spacing))
-    trajectory, attitude, _ = _windows(readings, delay, 2.0 if use_gyro else _COURSE_STD, steps, window, use_gyro)
+    trajectory, attitude, _ = _windows(readings, delay, window, use_gyro)
+    stage("between the instants")
+    between = _between(readings, trajectory, delay)
+    instants = between[0]
     covariance = np.zeros((len(attitude), 6, 6))
-    covariance[:, :3, :3] = np.asarray(attitude)
+    covariance[:, :3, :3] = attitude
     noise = replace(_WITH_GYRO if use_gyro else _WITHOUT_GYRO, acceleration=0.3)
-    instants = np.asarray(instants_at(readings, jnp.asarray(np.float64(delay))))
-    for axis, std in enumerate(np.asarray(readings.std).T):
+    for axis, std in enumerate(readings.std.T):
         known = np.isfinite(std)
         velocity = np.full(std.shape, _VELOCITY_STD)
         if known.any():
             away = np.abs(instants[:, None] - instants[known]).min(1)
             velocity = np.interp(instants, instants[known], std[known]) + 0.3 * away
         covariance[:, 3 + axis, 3 + axis] = velocity**2
-    estimate = _at_samples(recording, readings, trajectory, covariance, noise, delay, steps)
+    estimate = _at_samples(recording, readings, trajectory, between, covariance, noise, delay)
     estimate.attrs = {"delay": delay}
     return estimate
 
 
 def _found_batch(
-    recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None, beliefs: _Beliefs
-) -> tuple[_Batch, MotionReadings, int]:
+    recording: Recording,
+    use_gyro: bool,
+    wind: bool | str,
+    delay: float | None,
+    beliefs: _Beliefs,
+    stage: Stages,
+) -> tuple[_Batch, MotionReadings]:
     first = delay if delay is not None else _DELAY if beliefs.delay is None else beliefs.delay[0]
     if delay is None and use_gyro and beliefs.delay is None:
-        first = _delay_by_windows(*motion_readings(recording, use_gyro=use_gyro, delay=first))
-    batch, readings, steps = _first_batch(recording, use_gyro, wind, delay, first, beliefs)
-    batch = _most_probable(readings, batch, steps, estimate_delay=delay is None)
+        stage("delay of the GNSS velocities")
+        first = _delay_by_windows(motion_readings(recording, use_gyro=use_gyro, delay=first))
+    stage("first trajectory")
+    batch, readings = _first_batch(recording, use_gyro, wind, delay, first, beliefs)
+    batch = _most_probable(readings, batch, stage, estimate_delay=delay is None)
     if wind == "auto" and not use_gyro and _turns_around(readings, np.zeros(2)):
-        with_wind = batch.prior.covariance.at[[17, 18], [17, 18]].set(_WIND_STD**2)
-        windy = _most_probable(
-            readings,
-            replace(batch, prior=replace(batch.prior, covariance=with_wind)),
-            steps,
-            estimate_delay=delay is None,
-        )
-        vector = np.asarray(windy.fit.trajectory.constants)[5:7]
-        error = np.sqrt(np.diag(np.asarray(windy.fit.covariance)[-1])[17:19])
+        with_wind = batch.prior.covariance.copy()
+        with_wind[[17, 18], [17, 18]] = _WIND_STD**2
+        windy = replace(batch, prior=replace(batch.prior, covariance=with_wind))
+        windy = _most_probable(readings, windy, stage, estimate_delay=delay is None)
+        vector = windy.fit.trajectory.constants[5:7]
+        error = np.sqrt(np.diag(windy.fit.covariance[-1])[17:19])
         # Ten in the logarithm pays for two more constants many times over; below 1 m/s a wind is a crooked mount, and
         # one in which all courses are the same would let body x point anywhere.
         shown = batch.objective - windy.objective > 10 and np.hypot(*vector) > max(1.0, 4 * float(np.max(error)))
         if shown and _turns_around(readings, vector):
             batch = windy
-    return batch, readings, steps
+    stage("between the instants")
+    return batch, readings
 
 
-def _batch_estimate(recording: Recording, batch: _Batch, readings: MotionReadings, steps: int) -> pd.DataFrame:
-    covariance = np.asarray(batch.fit.covariance)
-    estimate = _at_samples(
-        recording, readings, batch.fit.trajectory, covariance[:, :6, :6], batch.noise, batch.delay, steps
-    )
+def _batch_estimate(recording: Recording, batch: _Batch, readings: MotionReadings) -> pd.DataFrame:
+    trajectory, covariance = batch.fit.trajectory, batch.fit.covariance[:, :6, :6]
+    between = _between(readings, trajectory, batch.delay)
+    estimate = _at_samples(recording, readings, trajectory, between, covariance, batch.noise, batch.delay)
     estimate.attrs.update(_summary(readings, batch))
     return estimate
 
@@ -239,22 +248,24 @@ def batch_with_constants(recording: Recording) -> Callable[[Calibration], pd.Dat
         is none of the constants, stay. Call it in double precision.
     """
     use_gyro = "gx" in imu_of(recording)
-    found, readings, steps = _found_batch(recording, use_gyro, "auto", None, _beliefs(None))
+    with stages(f"motion of {recording.name} by batch") as stage:
+        found, readings = _found_batch(recording, use_gyro, "auto", None, _beliefs(None), stage)
 
     def motion(calibration: Calibration) -> pd.DataFrame:
         beliefs = _beliefs(calibration)
         corrected = replace(recording, imu=correct_imu(imu_of(recording), calibration))
         again = _corrected_readings(readings, calibration, use_gyro)
         known = _prior_covariance(corrected, use_gyro, float(found.prior.course) > 0, False, False, beliefs)
-        covariance = found.prior.covariance.at[6:15, 6:15].set(known[6:15, 6:15])
+        covariance = found.prior.covariance.copy()
+        covariance[6:15, 6:15] = known[6:15, 6:15]
         batch = replace(
             found,
             prior=replace(found.prior, covariance=covariance),
             delay=found.delay if beliefs.delay is None else beliefs.delay[0],
         )
         start = found.fit.trajectory
-        fit = _passes(again, start, batch.prior, batch.noise, batch.delay, steps, passes=4)
-        return _batch_estimate(corrected, replace(batch, fit=fit), again, steps)
+        fit = _passes(again, start, batch.prior, batch.noise, batch.delay, passes=4)
+        return _batch_estimate(corrected, replace(batch, fit=fit), again)
 
     return motion
 
@@ -275,9 +286,9 @@ def _corrected_readings(readings: MotionReadings, calibration: Calibration, use_
 
 def _first_batch(
     recording: Recording, use_gyro: bool, wind: bool | str, delay: float | None, first: float, beliefs: _Beliefs
-) -> tuple[_Batch, MotionReadings, int]:
+) -> tuple[_Batch, MotionReadings]:
     """The best of several starts: turned about the vertical with a gyro, by several delays without."""
-    noise = _as_arrays(_WITH_GYRO if use_gyro else _WITHOUT_GYRO)
+    noise = _WITH_GYRO if use_gyro else _WITHOUT_GYRO
     course = not use_gyro or wind != "auto"
     delay_prior = beliefs.delay or (_DELAY, _DELAY_STD)
     covariance = _prior_covariance(recording, use_gyro, course, wind is True, delay is None, beliefs)
@@ -285,19 +296,19 @@ def _first_batch(
     search = delay is None and not use_gyro and beliefs.delay is None
     delays = _DELAYS_WITHOUT_GYRO if search else (first,)
     turns = (0.0, 0.5, 1.0, 1.5) if use_gyro else (0.0,)
-    best: tuple[_Batch, MotionReadings, int] | None = None
+    best: tuple[_Batch, MotionReadings] | None = None
     for trial in delays:
-        readings, steps = motion_readings(recording, use_gyro=use_gyro, delay=trial, longest=longest)
+        readings = motion_readings(recording, use_gyro=use_gyro, delay=trial, longest=longest)
         prior = MotionPrior(
-            covariance=jnp.asarray(covariance),
-            doubt=jnp.ones_like(readings.std),
-            course=jnp.asarray(1.0 if course else 0.0),
+            covariance=covariance,
+            doubt=np.ones_like(readings.std),
+            course=np.float64(course),
         )
         window = _odd(_WINDOW / float(readings.spacing)) if use_gyro else 1
-        start, _, _ = _windows(readings, trial, 2.0 if use_gyro else _COURSE_STD, steps, window, use_gyro)
+        start, _, _ = _windows(readings, trial, window, use_gyro)
         for turn in turns:
-            C = jnp.asarray(Rotation.from_rotvec([0.0, 0.0, turn * np.pi]).as_matrix()) @ start.C_nb
-            fit = _passes(readings, replace(start, C_nb=C), prior, noise, trial, steps, passes=5)
+            C = Rotation.from_rotvec([0.0, 0.0, turn * np.pi]).as_matrix() @ start.C_nb
+            fit = _passes(readings, replace(start, C_nb=C), prior, noise, trial, passes=5)
             objective = -float(fit.log_likelihood) + 0.5 * ((trial - delay_prior[0]) / delay_prior[1]) ** 2
             if best is None or objective < best[0].objective - 1.0:
                 batch = _Batch(
@@ -308,7 +319,7 @@ def _first_batch(
                     delay_prior=delay_prior,
                     objective=objective,
                 )
-                best = batch, readings, steps
+                best = batch, readings
     assert best is not None
     return best
 
@@ -328,7 +339,7 @@ def _prior_covariance(
     return covariance
 
 
-def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estimate_delay: bool) -> _Batch:
+def _most_probable(readings: MotionReadings, batch: _Batch, stage: Stages, *, estimate_delay: bool) -> _Batch:
     """Noise levels, delay and trajectory in turns, until the levels stay."""
     prior, noise, delay = batch.prior, batch.noise, batch.delay
     trajectory = batch.fit.trajectory
@@ -338,27 +349,28 @@ def _most_probable(readings: MotionReadings, batch: _Batch, steps: int, *, estim
     spread = np.append([_WALK_SPREAD if name in _WALKS else _SPREAD for name in names], batch.delay_prior[1])
     objective = np.inf
     for turn in range(6):
+        stage(f"noise levels, round {turn + 1}")
         x0 = np.append(np.log([float(getattr(noise, name)) for name in names]), delay)
 
         reach = np.append(np.full(len(names), 2.0), 0.15 if estimate_delay else 0.0)
         found = minimize(
             _misfit,
             x0,
-            args=(names, nominal, spread, readings, trajectory, prior, noise, steps),
+            args=(names, nominal, spread, readings, trajectory, prior, noise),
             jac=True,
             method="L-BFGS-B",
             bounds=list(zip(x0 - reach, x0 + reach, strict=True)),
             options={"maxiter": 12, "maxfun": 16, "ftol": 1e-5},
         )
-        noise = _as_arrays(replace(noise, **dict(zip(names, np.exp(found.x[:-1]).tolist(), strict=True))))
+        noise = replace(noise, **dict(zip(names, np.exp(found.x[:-1]).tolist(), strict=True)))
         delay = float(found.x[-1])
-        fit = _passes(readings, trajectory, prior, noise, delay, steps, passes=8)
+        fit = _passes(readings, trajectory, prior, noise, delay, passes=8)
         trajectory, prior = fit.trajectory, replace(prior, doubt=fit.doubt)
         settled = turn > 1 and abs(found.fun - objective) < 1.0
         objective = float(found.fun)
         if settled:
             break
-    fit = _passes(readings, trajectory, prior, noise, delay, steps, passes=8)
+    fit = _passes(readings, trajectory, prior, noise, delay, passes=8)
     return replace(batch, fit=fit, prior=prior, noise=noise, delay=delay, objective=objective)
 
 
@@ -371,26 +383,21 @@ def _misfit(
     trajectory: Trajectory,
     prior: MotionPrior,
     noise: MotionNoise,
-    steps: int,
 ) -> tuple[float, np.ndarray]:
     """Minus the log-posterior of the logarithms of noise levels and the delay, and its gradient."""
     levels = dict(zip(names, np.exp(x[:-1]).tolist(), strict=True))
-    fit = _pass(readings, trajectory, prior, _as_arrays(replace(noise, **levels)), jnp.asarray(x[-1]), steps)
-    slope = [-float(np.asarray(getattr(fit.by_noise, name))) * levels[name] for name in names] + [-float(fit.by_delay)]
+    fit = _pass(readings, trajectory, prior, replace(noise, **levels), float(x[-1]))
+    slope = [-float(getattr(fit.by_noise, name)) * levels[name] for name in names] + [-float(fit.by_delay)]
     off = (x - nominal) / spread
     return -float(fit.log_likelihood) + 0.5 * float(off @ off), np.array(slope) + off / spread
 
 
-@partial(jax.jit, static_argnames="steps")
 def _pass(
-    readings: MotionReadings,
-    trajectory: Trajectory,
-    prior: MotionPrior,
-    noise: MotionNoise,
-    delay: jax.Array,
-    steps: int,
+    readings: MotionReadings, trajectory: Trajectory, prior: MotionPrior, noise: MotionNoise, delay: float
 ) -> MotionFit:
-    return motion_pass(readings, trajectory, prior, noise, delay, steps)
+    """`motion_pass` from NumPy to NumPy: an operation on an array of JAX compiles a program of its own."""
+    levels = MotionNoise(**{name: np.float64(getattr(noise, name)) for name in _LEVELS})
+    return jax.device_get(motion_pass(readings, trajectory, prior, levels, np.float64(delay)))
 
 
 def _passes(
@@ -399,34 +406,29 @@ def _passes(
     prior: MotionPrior,
     noise: MotionNoise,
     delay: float,
-    steps: int,
     passes: int,
 ) -> MotionFit:
     for _ in range(passes):
-        fit = _pass(readings, trajectory, prior, noise, jnp.asarray(np.float64(delay)), steps)
+        fit = _pass(readings, trajectory, prior, noise, delay)
         trajectory = fit.trajectory
         if float(fit.step) < 1e-4:
             break
     return fit
 
 
-@partial(jax.jit, static_argnames=("steps", "window", "gyro"))
-def _windowed(
-    readings: MotionReadings, delay: jax.Array, prior_std: jax.Array, steps: int, window: int, gyro: bool
-) -> tuple[Trajectory, jax.Array, jax.Array]:
-    return window_attitudes(readings, delay, prior_std, steps, window, gyro=gyro)
-
-
 def _windows(
-    readings: MotionReadings, delay: float, prior_std: float, steps: int, window: int, gyro: bool
-) -> tuple[Trajectory, jax.Array, jax.Array]:
-    return _windowed(readings, jnp.asarray(np.float64(delay)), jnp.asarray(np.float64(prior_std)), steps, window, gyro)
+    readings: MotionReadings, delay: float, window: int, use_gyro: bool
+) -> tuple[Trajectory, np.ndarray, np.ndarray]:
+    prior_std = np.float64(2.0 if use_gyro else _COURSE_STD)
+    return jax.device_get(
+        window_attitudes(readings, np.float64(delay), prior_std, np.int64(window), np.bool_(use_gyro))
+    )
 
 
-def _delay_by_windows(readings: MotionReadings, steps: int) -> float:
+def _delay_by_windows(readings: MotionReadings) -> float:
     """Delay at which windows of epochs, turned by the gyro, fit best: the least of a grid and its neighbours."""
     window = _odd(_WINDOW / float(readings.spacing))
-    misfits = np.array([float(_windows(readings, delay, 2.0, steps, window, True)[2]) for delay in _DELAYS])
+    misfits = np.array([float(_windows(readings, delay, window, True)[2]) for delay in _DELAYS])
     k = int(np.clip(np.argmin(misfits), 1, len(_DELAYS) - 2))
     before, least, after = misfits[k - 1 : k + 2]
     bend = before - 2 * least + after
@@ -438,60 +440,54 @@ def _odd(count: float) -> int:
     return 2 * round(max(count - 1, 2) / 2) + 1
 
 
-def _as_arrays(noise: MotionNoise) -> MotionNoise:
-    return MotionNoise(**{name: jnp.asarray(np.float64(getattr(noise, name))) for name in _LEVELS})
-
-
 def _turns_around(readings: MotionReadings, wind: np.ndarray) -> bool:
     """Whether the courses through the air spread enough to tell a wind from a crooked mount."""
-    v = np.asarray(readings.v_gnss)[np.isfinite(np.asarray(readings.std)[:, 0]), :2] - wind
+    v = readings.v_gnss[np.isfinite(readings.std[:, 0]), :2] - wind
     speed = np.hypot(*v.T)
     moving = speed > 3.0
     return bool(moving.sum() > 10 and np.linalg.norm(np.mean(v[moving] / speed[moving, None], 0)) < 0.8)
 
 
 def _summary(readings: MotionReadings, batch: _Batch) -> dict[str, object]:
-    there = np.isfinite(np.asarray(readings.std))
-    constants = np.asarray(batch.fit.trajectory.constants)
-    surprise = np.asarray(batch.fit.surprise)[there]
+    there = np.isfinite(readings.std)
+    trajectory, constants = batch.fit.trajectory, batch.fit.trajectory.constants
+    surprise = batch.fit.surprise[there]
     return {
         "delay": batch.delay,
         "noise": {name: float(getattr(batch.noise, name)) for name in _LEVELS},
         "nis": float(np.mean(surprise**2)),
-        "outliers": int(np.sum(np.asarray(batch.prior.doubt)[there] > 1)),
+        "outliers": int(np.sum(batch.prior.doubt[there] > 1)),
         "wind": constants[5:7].tolist() if float(batch.prior.covariance[17, 17]) > 0 else None,
         "climb_delay": float(constants[7]),
         "gyro_scale": (1 / (1 + constants[:3])).tolist(),
-        "accelerometer_bias": np.asarray(batch.fit.trajectory.accelerometer_bias).mean(0).tolist(),
-        "gyro_bias": np.asarray(batch.fit.trajectory.gyro_bias).mean(0).tolist(),
+        "accelerometer_bias": trajectory.accelerometer_bias.mean(0).tolist(),
+        "gyro_bias": trajectory.gyro_bias.mean(0).tolist(),
         "objective": batch.objective,
     }
 
 
-@partial(jax.jit, static_argnames="steps")
-def _between(readings: MotionReadings, trajectory: Trajectory, delay: jax.Array, steps: int) -> tuple:
-    return motion_between(readings, trajectory, delay, steps)
+def _between(readings: MotionReadings, trajectory: Trajectory, delay: float) -> tuple[np.ndarray, ...]:
+    return jax.device_get(motion_between(readings, trajectory, np.float64(delay)))
 
 
 def _at_samples(
     recording: Recording,
     readings: MotionReadings,
     trajectory: Trajectory,
+    between: tuple[np.ndarray, ...],
     covariance: np.ndarray,
     noise: MotionNoise,
     delay: float,
-    steps: int,
 ) -> pd.DataFrame:
     """Attitude, velocity and their errors at each IMU sample."""
     imu = imu_of(recording)
     t = imu.index.to_numpy(float) - start_of(recording)
-    instants = np.asarray(instants_at(readings, jnp.asarray(np.float64(delay))))
-    ends, C, v, gained = map(np.asarray, _between(readings, trajectory, jnp.asarray(np.float64(delay)), steps))
+    instants, ends, C, v, gained = between
     knots = np.append(instants[0], ends.ravel())
     kept = np.append(True, np.diff(np.maximum.accumulate(knots)) > 1e-9)
     knots = knots[kept]
-    attitudes = np.concatenate([np.asarray(trajectory.C_nb)[:1], C.reshape(-1, 3, 3)])[kept]
-    velocities = np.concatenate([np.asarray(trajectory.v_n)[:1], v.reshape(-1, 3)])[kept]
+    attitudes = np.concatenate([trajectory.C_nb[:1], C.reshape(-1, 3, 3)])[kept]
+    velocities = np.concatenate([trajectory.v_n[:1], v.reshape(-1, 3)])[kept]
     inside = np.clip(t, knots[0], knots[-1])
     C_nb = Slerp(knots, Rotation.from_matrix(attitudes))(inside).as_matrix()
 
@@ -503,7 +499,7 @@ def _at_samples(
     P = (1 - s)[:, None, None] * P[k] + s[:, None, None] * P[k + 1]
     # Between two known ends a random walk has the variance s (1 - s) dt.
     bridge = s * (1 - s) * dt
-    rotation, acceleration = (float(np.asarray(level)) ** 2 for level in (noise.rotation, noise.acceleration))
+    rotation, acceleration = (float(level) ** 2 for level in (noise.rotation, noise.acceleration))
     force = np.linalg.norm(gained[np.flatnonzero(distinct)[k]], axis=-1) / dt
     attitude = P[:, :3, :3] + (rotation * bridge + _AXES_STD**2)[:, None, None] * np.eye(3)
     velocity = np.diagonal(P, axis1=1, axis2=2)[:, 3:6] + (acceleration * bridge)[:, None]
@@ -538,7 +534,7 @@ def _at_samples(
 
 def _supported(readings: MotionReadings, t: np.ndarray, delay: float) -> np.ndarray:
     """Where GNSS velocities lie close on both sides and the IMU has no gap."""
-    epochs = np.asarray(readings.instant)[np.isfinite(np.asarray(readings.std)[:, 0])] - delay
+    epochs = readings.instant[np.isfinite(readings.std[:, 0])] - delay
     longest = max(5 * float(readings.spacing), 2.0)
     k = np.searchsorted(epochs, t)
     before = t - epochs[np.clip(k - 1, 0, epochs.size - 1)]

@@ -4,8 +4,11 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from altijax.motion_estimate.model import Intervals
+
+Array = jax.Array | np.ndarray
 
 
 @jax.tree_util.register_dataclass
@@ -29,42 +32,49 @@ class MotionReadings:
         Velocities; any value where there is none.
     std : (time, 3) m/s
         Their standard deviations as far as known beforehand; infinite where there is none.
-    spacing : (time,) s
+    spacing : () s
         Usual time between epochs.
+    share : (steps + 1,)
+        Where the steps of an interval begin and end, from 0 to 1; the last ones only fill up and have no length.
     gravity : () m/s^2
         Magnitude of gravity.
     """
 
-    t: jax.Array
-    readings: jax.Array
-    sums: jax.Array
-    instant: jax.Array
-    delayed: jax.Array
-    v_gnss: jax.Array
-    std: jax.Array
-    spacing: jax.Array
-    gravity: jax.Array
+    t: Array
+    readings: Array
+    sums: Array
+    instant: Array
+    delayed: Array
+    v_gnss: Array
+    std: Array
+    spacing: Array
+    share: Array
+    gravity: Array
 
 
 def instants_at(readings: MotionReadings, delay: jax.Array) -> jax.Array:
     """Times of the instants on the IMU's clock, within its span and never backwards."""
-    t = readings.instant - delay * readings.delayed
-    return jax.lax.cummax(jnp.clip(t, readings.t[0], readings.t[-1]))
+    t = jnp.clip(readings.instant - delay * readings.delayed, readings.t[0], readings.t[-1])
+    # The latest so far, by its place: JAX differentiates a running maximum by a tree of many copies.
+    fixed = jax.lax.stop_gradient(t)
+    return t[jax.lax.cummax(jnp.where(fixed == jax.lax.cummax(fixed), jnp.arange(t.size), 0))]
 
 
-def intervals_between(readings: MotionReadings, t: jax.Array, steps: int) -> Intervals:
+def intervals_between(readings: MotionReadings, t: jax.Array) -> Intervals:
     """Mean readings over equal steps between instants, exact for readings that run straight between samples."""
+    t_imu, values, total = jnp.asarray(readings.t), jnp.asarray(readings.readings), jnp.asarray(readings.sums)
+    share = jnp.asarray(readings.share)
     duration = jnp.diff(t)
-    share = jnp.arange(steps + 1, dtype=t.dtype) / steps
     edges = t[:-1, None] + duration[:, None] * share
-    k = jnp.clip(jnp.searchsorted(readings.t, edges, side="right") - 1, 0, readings.t.size - 2)
-    later = edges - readings.t[k]
-    part = (later / (readings.t[k + 1] - readings.t[k]))[..., None]
-    value, rise = readings.readings[k], readings.readings[k + 1] - readings.readings[k]
-    sums = readings.sums[k] + later[..., None] * (value + 0.5 * part * rise)
-    lost = readings.sums[k, 6] + part[..., 0] * (readings.sums[k + 1, 6] - readings.sums[k, 6])
+    k = jnp.clip(jnp.searchsorted(t_imu, edges, side="right") - 1, 0, t_imu.size - 2)
+    later = edges - t_imu[k]
+    part = (later / (t_imu[k + 1] - t_imu[k]))[..., None]
+    value, rise = values[k], values[k + 1] - values[k]
+    sums = total[k] + later[..., None] * (value + 0.5 * part * rise)
+    lost = total[k, 6] + part[..., 0] * (total[k + 1, 6] - total[k, 6])
+    dt = duration[:, None] * jnp.diff(share)
     # A step of no length has the reading of its instant.
-    short = (duration <= 1e-9)[:, None, None]
-    means = jnp.diff(sums[..., :6], axis=1) / jnp.where(short, 1, duration[:, None, None] / steps)
+    short = ((duration <= 1e-9)[:, None] | (dt <= 0))[..., None]
+    means = jnp.diff(sums[..., :6], axis=1) / jnp.where(short, 1, dt[..., None])
     means = jnp.where(short, (value + part * rise)[:, :-1, :6], means)
-    return Intervals(f_b=means[..., :3], w_b=means[..., 3:], duration=duration, gap=lost[:, -1] - lost[:, 0])
+    return Intervals(f_b=means[..., :3], w_b=means[..., 3:], dt=dt, duration=duration, gap=lost[:, -1] - lost[:, 0])

@@ -117,6 +117,8 @@ class Intervals:
         Mean specific force of equal steps.
     w_b : (intervals, steps, 3) rad/s
         Mean angular rate of the same; zero without a gyro.
+    dt : (intervals, steps) s
+        Length of each step; zero where steps only fill an interval up.
     duration : (intervals,) s
         Length of each interval.
     gap : (intervals,) s
@@ -125,6 +127,42 @@ class Intervals:
 
     f_b: jax.Array
     w_b: jax.Array
+    dt: jax.Array
+    duration: jax.Array
+    gap: jax.Array
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Gains:
+    """What the readings say of each interval, in navigation axes: all that depends on when its instants are.
+
+    Attributes
+    ----------
+    velocity : (intervals, 3) m/s
+        Integral of the specific force.
+    turn_by_gyro : (intervals, 3, 6)
+        Derivative of the final attitude, as a rotation vector, by gyro bias (rad/s) and inverse gyro scale.
+    velocity_by_gyro : (intervals, 3, 6)
+        Derivative of the final velocity by the same.
+    velocity_by_bias : (intervals, 3, 3) s
+        Derivative of the final velocity by the accelerometer bias.
+    velocity_by_turn : (intervals, 3, 3) m/s
+        Derivative of the final velocity by a rotation vector that grows evenly over the interval.
+    miss : (intervals, 3) rad
+        Rotation vector from the attitude that the gyro leads to to the trajectory's own.
+    duration : (intervals,) s
+        Length of each interval.
+    gap : (intervals,) s
+        How much of it no reading supports.
+    """
+
+    velocity: jax.Array
+    turn_by_gyro: jax.Array
+    velocity_by_gyro: jax.Array
+    velocity_by_bias: jax.Array
+    velocity_by_turn: jax.Array
+    miss: jax.Array
     duration: jax.Array
     gap: jax.Array
 
@@ -140,19 +178,19 @@ def preintegrated_intervals(trajectory: Trajectory, intervals: Intervals) -> tup
         Rotation vector, in navigation axes, from the attitude that the gyro leads to to the trajectory's own.
     """
     C, scale = trajectory.C_nb[:-1], 1 + trajectory.constants[:3]
-    dt = intervals.duration / intervals.f_b.shape[1]
     w_b = intervals.w_b * scale - trajectory.gyro_bias[:-1, None]
     f_b = intervals.f_b - trajectory.accelerometer_bias[:-1, None]
 
-    by_gyro = relative_attitudes(w_b, dt)
+    by_gyro = relative_attitudes(w_b, intervals.dt)
     reached = jnp.swapaxes(C, -1, -2) @ trajectory.C_nb[1:]
     turn = matrix_to_rotvec(reached @ jnp.swapaxes(by_gyro[:, -1], -1, -2))
-    summed = preintegrate(f_b, w_b, by_gyro, turn, dt)
+    summed = preintegrate(f_b, w_b, by_gyro, turn, intervals.dt)
     bias = trajectory.gyro_bias[:-1, None]
 
     def by_raw_rate(columns: jax.Array) -> jax.Array:
         """The scale multiplies the reading before the bias is taken off."""
-        return columns.at[..., 3:].set((columns[..., 3:] - bias * columns[..., :3]) / scale)
+        by_bias, by_scale = columns[..., :3], columns[..., 3:]
+        return jnp.concatenate([by_bias, (by_scale - bias * by_bias) / scale], -1)
 
     summed = replace(
         summed,
@@ -162,8 +200,24 @@ def preintegrated_intervals(trajectory: Trajectory, intervals: Intervals) -> tup
     return summed, jnp.einsum("kij,kj->ki", C, turn)
 
 
+def interval_gains(trajectory: Trajectory, intervals: Intervals) -> Gains:
+    """What the readings say of each interval, about a trajectory."""
+    preintegrated, miss = preintegrated_intervals(trajectory, intervals)
+    C = trajectory.C_nb[:-1]
+    return Gains(
+        velocity=jnp.einsum("kij,kj->ki", C, preintegrated.velocity[:, -1]),
+        turn_by_gyro=C @ preintegrated.turn_by_gyro,
+        velocity_by_gyro=C @ preintegrated.velocity_by_gyro,
+        velocity_by_bias=C @ preintegrated.velocity_by_bias,
+        velocity_by_turn=C @ preintegrated.velocity_by_turn @ jnp.swapaxes(C, -1, -2),
+        miss=miss,
+        duration=intervals.duration,
+        gap=intervals.gap,
+    )
+
+
 def motion_transitions(
-    trajectory: Trajectory, intervals: Intervals, noise: MotionNoise, gravity: ArrayLike
+    trajectory: Trajectory, gains: Gains, noise: MotionNoise, gravity: ArrayLike
 ) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Transition of the error state over each interval.
 
@@ -171,8 +225,8 @@ def motion_transitions(
     ----------
     trajectory : Trajectory
         Where to linearise.
-    intervals : Intervals
-        Readings.
+    gains : Gains
+        What the readings say of each interval, about the same trajectory.
     noise : MotionNoise
         Noise levels.
     gravity : () m/s^2
@@ -187,63 +241,45 @@ def motion_transitions(
     Q : (intervals, 22, 22)
         Covariance of the noise.
     """
-    preintegrated, miss = preintegrated_intervals(trajectory, intervals)
     gravity = require_shape("gravity", gravity, ())
-    down = jnp.array([0, 0, -1], gravity.dtype) * gravity
+    gained, by_turn, dt, gap = gains.velocity, gains.velocity_by_turn, gains.duration, gains.gap
+    dtype, count = dt.dtype, dt.size
+    down = jnp.array([0, 0, -1], dtype) * gravity
+    identity = jnp.eye(STATES, dtype=dtype)
+    lever = skew(gained)
+    kept = jnp.exp(-dt / noise.slip_time)
 
-    def one(
-        C: jax.Array,
-        v: jax.Array,
-        v_next: jax.Array,
-        p: Preintegrated,
-        miss: jax.Array,
-        dt: jax.Array,
-        gap: jax.Array,
-        slip: jax.Array,
-        slip_next: jax.Array,
-    ) -> tuple[jax.Array, jax.Array, jax.Array]:
-        gained = C @ p.velocity[-1]
-        by_turn = C @ p.velocity_by_turn @ C.T
-        identity = jnp.eye(3, dtype=C.dtype)
-        F = jnp.eye(STATES, dtype=C.dtype)
-        F = F.at[:3, 9:15].set(C @ p.turn_by_gyro)
-        F = F.at[3:6, :3].set(-skew(gained))
-        F = F.at[3:6, 6:9].set(C @ p.velocity_by_bias)
-        F = F.at[3:6, 9:15].set(C @ p.velocity_by_gyro)
-        c = jnp.zeros(STATES, C.dtype).at[:3].set(-miss)
-        c = c.at[3:6].set(v + down * dt + gained - v_next - by_turn @ miss)
-        turned = noise.rotation**2 * dt + (_UNSEEN_TURN * gap) ** 2
-        # An even turn is what the ends of a random walk leave on average; about it the walk still wanders.
-        wander = skew(gained) @ skew(gained).T / 12
-        moved = noise.acceleration**2 * dt + (_UNSEEN_ACCELERATION * gap) ** 2
-        Q = jnp.zeros((STATES, STATES), C.dtype)
-        Q = Q.at[:3, :3].set(turned * identity)
-        Q = Q.at[3:6, :3].set(turned * by_turn)
-        Q = Q.at[:3, 3:6].set(turned * by_turn.T)
-        Q = Q.at[3:6, 3:6].set(turned * (by_turn @ by_turn.T + wander) + moved * identity)
-        Q = Q.at[6:9, 6:9].set(noise.accelerometer_walk**2 * dt * identity)
-        Q = Q.at[9:12, 9:12].set(noise.gyro_walk**2 * dt * identity)
-        kept = jnp.exp(-dt / noise.slip_time)
-        F = F.at[20:, 20:].set(kept * jnp.eye(2, dtype=C.dtype))
-        slips = jnp.stack([jnp.asarray(noise.sideslip), jnp.asarray(noise.attack)])
-        Q = Q.at[20:, 20:].set(jnp.diag(slips**2 * -jnp.expm1(-2 * dt / noise.slip_time)))
-        c = c.at[20:].set(kept * slip - slip_next)
-        return F, c, Q
+    def zeros(*shape: int) -> jax.Array:
+        return jnp.zeros((count, *shape), dtype)
+
+    attitude = jnp.concatenate([zeros(3, 9), gains.turn_by_gyro, zeros(3, 7)], -1)
+    velocity = [-lever, zeros(3, 3), gains.velocity_by_bias, gains.velocity_by_gyro, zeros(3, 7)]
+    fading = (jnp.arange(STATES) >= 20) * (kept - 1)[:, None]
+    F = identity + jnp.concatenate([attitude, jnp.concatenate(velocity, -1), zeros(16, STATES)], -2)
+    F = F + fading[:, None] * identity
 
     before, after = slice(None, -1), slice(1, None)
-    F, c, Q = jax.vmap(one)(
-        trajectory.C_nb[before],
-        trajectory.v_n[before],
-        trajectory.v_n[after],
-        preintegrated,
-        miss,
-        intervals.duration,
-        intervals.gap,
-        trajectory.slip[before],
-        trajectory.slip[after],
+    missing = trajectory.v_n[before] + down * dt[:, None] + gained - trajectory.v_n[after]
+    missing = missing - jnp.einsum("kij,kj->ki", by_turn, gains.miss)
+    walked = [b[before] - b[after] for b in (trajectory.accelerometer_bias, trajectory.gyro_bias)]
+    slipped = kept[:, None] * trajectory.slip[before] - trajectory.slip[after]
+    c = jnp.concatenate([-gains.miss, missing, *walked, zeros(8), slipped], -1)
+
+    turned = (noise.rotation**2 * dt + (_UNSEEN_TURN * gap) ** 2)[:, None, None]
+    # An even turn is what the ends of a random walk leave on average; about it the walk still wanders.
+    wander = lever @ jnp.swapaxes(lever, -1, -2) / 12
+    spread = by_turn @ jnp.swapaxes(by_turn, -1, -2) + wander
+    upper = jnp.concatenate(
+        [jnp.broadcast_to(jnp.eye(3, dtype=dtype), by_turn.shape), jnp.swapaxes(by_turn, -1, -2)], -1
     )
-    c = c.at[:, 6:9].set(trajectory.accelerometer_bias[before] - trajectory.accelerometer_bias[after])
-    return F, c.at[:, 9:12].set(trajectory.gyro_bias[before] - trajectory.gyro_bias[after]), Q
+    moving = turned * jnp.concatenate([upper, jnp.concatenate([by_turn, spread], -1)], -2)
+    shaken = noise.acceleration**2 * dt + (_UNSEEN_ACCELERATION * gap) ** 2
+    forgotten = -jnp.expm1(-2 * dt / noise.slip_time)
+    variances = [shaken, noise.accelerometer_walk**2 * dt, noise.gyro_walk**2 * dt]
+    slips = [noise.sideslip**2 * forgotten, noise.attack**2 * forgotten]
+    alone = jnp.concatenate([zeros(3), jnp.repeat(jnp.stack(variances, -1), 3, -1), zeros(8), jnp.stack(slips, -1)], -1)
+    Q = jnp.pad(moving, [(0, 0), (0, STATES - 6), (0, STATES - 6)]) + alone[:, None] * identity
+    return F, c, Q
 
 
 def motion_measurements(
@@ -278,22 +314,32 @@ def motion_measurements(
     variance = require_shape("variance", variance, v_gnss.shape)
     slip_variance = require_shape("slip_variance", slip_variance, v_gnss.shape[:1])
     climbing = require_shape("climbing", climbing, v_gnss.shape[:1])
+    constants, count, dtype = trajectory.constants, len(v_gnss), v_gnss.dtype
+    air = trajectory.v_n - jnp.append(constants[5:7], 0.0)
+    C_bn = jnp.swapaxes(trajectory.C_nb, -1, -2)
+    in_body = jnp.einsum("kij,kj->ki", C_bn, air)
 
-    def seen(x: jax.Array, C: jax.Array, v: jax.Array, slip: jax.Array, climbing: jax.Array) -> jax.Array:
-        """Velocities, and by how much mount and slips miss the yaw and pitch of body x from the direction of travel."""
-        constants = trajectory.constants + x[12:20]
-        v, slip = v + x[3:6], slip + x[20:] + constants[3:5]
-        wind = jnp.append(constants[5:7], 0.0)
-        forward, left, up = (rotvec_to_matrix(x[:3]) @ C).T @ (v - wind)
-        yaw = _safe.arctan2(left, forward) + slip[0]
-        pitch = _safe.arctan2(up, _safe.norm(jnp.stack([forward, left]))) + slip[1]
-        return jnp.concatenate([v.at[2].add(-constants[7] * climbing), jnp.stack([yaw, pitch])])
+    def angles(v_b: jax.Array) -> jax.Array:
+        """Yaw and pitch of the direction of travel in body axes."""
+        forward, left, up = v_b
+        return jnp.stack([_safe.arctan2(left, forward), _safe.arctan2(up, _safe.norm(v_b[:2]))])
 
-    zero = jnp.zeros(STATES, v_gnss.dtype)
-    inputs = trajectory.C_nb, trajectory.v_n, trajectory.slip, climbing
-    at = jax.vmap(seen, in_axes=(None, 0, 0, 0, 0))(zero, *inputs)
-    H = jax.vmap(jax.jacfwd(seen), in_axes=(None, 0, 0, 0, 0))(zero, *inputs)
-    air = trajectory.v_n.at[:, :2].add(-trajectory.constants[5:7])
+    missed = jax.vmap(angles)(in_body) + trajectory.slip + constants[3:5]
+    by_velocity = jax.vmap(jax.jacfwd(angles))(in_body) @ C_bn
+    late = -constants[7] * climbing * jnp.eye(3, dtype=dtype)[2][:, None]
+    at = jnp.concatenate([trajectory.v_n + late.T, missed], -1)
+
+    def fixed(matrix: jax.Array) -> jax.Array:
+        return jnp.broadcast_to(matrix, (count, *matrix.shape))
+
+    two, none = jnp.eye(2, dtype=dtype), jnp.zeros
+    later = -climbing[:, None, None] * jnp.eye(3, dtype=dtype)[:, 2:]
+    velocity = [fixed(none((3, 3), dtype)), fixed(jnp.eye(3, dtype=dtype)), fixed(none((3, 13), dtype)), later]
+    velocity.append(fixed(none((3, 2), dtype)))
+    slip = [by_velocity @ skew(air), by_velocity, fixed(none((2, 9), dtype)), fixed(two), -by_velocity[..., :2]]
+    slip += [fixed(none((2, 1), dtype)), fixed(two)]
+    H = jnp.concatenate([jnp.concatenate(velocity, -1), jnp.concatenate(slip, -1)], -2)
+
     slip_variance = slip_variance + _SLIP**2 / jnp.maximum(jnp.sum(air * air, -1), 1e-6)
     R = jnp.concatenate([variance, slip_variance[:, None], slip_variance[:, None]], -1)
     there = jnp.isfinite(R)

@@ -9,10 +9,16 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
 from altijax.rotations import rotvec_to_matrix, skew
+
+# Of the cross product: element i of u x v is the sum of [i, a, b] u_a v_b.
+_CROSS = np.array(
+    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
+)
 
 
 @jax.tree_util.register_dataclass
@@ -51,8 +57,8 @@ def relative_attitudes(w_b: ArrayLike, dt: ArrayLike) -> jax.Array:
     ----------
     w_b : (..., time, 3) rad/s
         Mean angular rate of each step.
-    dt : (...) s
-        Length of a step.
+    dt : (..., time) s
+        Length of each step; zero where steps only fill an interval up.
 
     Returns
     -------
@@ -65,12 +71,12 @@ def relative_attitudes(w_b: ArrayLike, dt: ArrayLike) -> jax.Array:
         If the shapes do not fit.
     """
     w_b = require_shape("w_b", w_b, (..., None, 3))
-    turns = w_b * require_shape("dt", dt, (...,))[..., None, None]
+    turns = w_b * require_shape("dt", dt, (..., w_b.shape[-2]))[..., None]
     before = jnp.concatenate([turns[..., :1, :], turns[..., :-1, :]], -2)
     steps = rotvec_to_matrix(turns + jnp.cross(before, turns) / 12)
 
     def chain(C: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
-        C = C @ step
+        C = _product(C, step)
         return C, C
 
     start = jnp.broadcast_to(jnp.eye(3, dtype=w_b.dtype), (*steps.shape[:-3], 3, 3))
@@ -90,8 +96,8 @@ def preintegrate(f_b: ArrayLike, w_b: ArrayLike, C: ArrayLike, turn: ArrayLike, 
         Attitude at the end of each step by the gyro, as of `relative_attitudes`.
     turn : (..., 3) rad
         Rotation vector, in the axes of the beginning, by which the gyro missed the final attitude; it is spread evenly.
-    dt : (...) s
-        Length of a step.
+    dt : (..., time) s
+        Length of each step; zero where steps only fill an interval up.
 
     Returns
     -------
@@ -107,24 +113,31 @@ def preintegrate(f_b: ArrayLike, w_b: ArrayLike, C: ArrayLike, turn: ArrayLike, 
     steps = f_b.shape[-2]
     w_b = require_shape("w_b", w_b, (..., steps, 3))
     turn = require_shape("turn", turn, (..., 3))
-    dt = require_shape("dt", dt, (...,))
-    step = dt[..., None, None]
+    dt = require_shape("dt", dt, (..., steps))
     C = require_shape("C", C, (..., steps, 3, 3))
-    middle = C @ rotvec_to_matrix(-0.5 * step * w_b)
-    ends = (jnp.arange(steps, dtype=f_b.dtype) + 1) / steps
-    share = ends - 0.5 / steps
-    C = rotvec_to_matrix(ends[:, None] * turn[..., None, :]) @ C
-    middle = rotvec_to_matrix(share[:, None] * turn[..., None, :]) @ middle
-    gains = jnp.einsum("...ij,...j->...i", middle, f_b) * step
-    by_gyro = jnp.concatenate([-middle, middle * w_b[..., None, :]], -1) * step[..., None]
-    summed = jnp.cumsum(by_gyro, -3)
-    until_middle = summed - 0.5 * by_gyro
-    lever = skew(gains)
+    ends = jnp.cumsum(dt, -1)
+    whole = jnp.where(ends[..., -1:] > 0, ends[..., -1:], 1)
+    ends, middles = ends / whole, (ends - 0.5 * dt) / whole
+    middle = _product(C, rotvec_to_matrix(-0.5 * dt[..., None] * w_b))
+    middle = _product(rotvec_to_matrix(middles[..., None] * turn[..., None, :]), middle) * dt[..., None, None]
+    gains = jnp.sum(middle * f_b[..., None, :], -1)
+    velocity = jnp.cumsum(gains, -2)
+    # What turns the body at the middle of a step turns all the velocity that is gained after it.
+    after = velocity[..., -1:, :] - velocity + 0.5 * gains
+    by_gyro = jnp.concatenate([middle, -middle * w_b[..., None, :]], -1)
+    rows = jnp.concatenate([jnp.ones_like(after[..., :1]), after], -1)
+    sums = jnp.einsum("...ta,...tbj->...abj", rows, by_gyro)
+    levered = jnp.sum(_CROSS[..., None] * sums[..., None, 1:, :, :], (-3, -2))
     return Preintegrated(
-        C=C,
-        velocity=jnp.cumsum(gains, -2),
-        turn_by_gyro=summed[..., -1, :, :],
-        velocity_by_gyro=-jnp.einsum("...tij,...tjk->...ik", lever, until_middle),
-        velocity_by_bias=-jnp.sum(middle, -3) * step,
-        velocity_by_turn=-jnp.einsum("t,...tij->...ij", share, lever),
+        C=_product(rotvec_to_matrix(ends[..., None] * turn[..., None, :]), C),
+        velocity=velocity,
+        turn_by_gyro=-sums[..., 0, :, :],
+        velocity_by_gyro=levered,
+        velocity_by_bias=-sums[..., 0, :, :3],
+        velocity_by_turn=-skew(jnp.sum(middles[..., None] * gains, -2)),
     )
+
+
+def _product(A: jax.Array, B: jax.Array) -> jax.Array:
+    """``A @ B`` as a sum that XLA fuses with what is around it; batches of small matrices cost it a library call."""
+    return jnp.sum(A[..., :, :, None] * B[..., None, :, :], -2)

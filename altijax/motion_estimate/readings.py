@@ -1,23 +1,24 @@
 """From a recording to the arrays of the motion estimators: summed IMU readings, and instants with velocities."""
 
-import jax.numpy as jnp
 import numpy as np
 
 from altijax.drives import gravity_at, imu_of, start_of
 from altijax.motion_estimate.intervals import MotionReadings
+from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 
 # Standard deviation of a velocity whose receiver states none, before it is estimated, m/s.
 _VELOCITY_STD = 0.1
 _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
-# Sizes are rounded up to multiples of these, so that recordings of like length share what was compiled.
-_SAMPLES, _INSTANTS, _STEPS = 2048, 64, 8
+# The smallest sizes that samples, instants and steps are filled up to, so that recordings of like length share what was
+# compiled, and what steps are rounded up to.
+_SAMPLES, _INSTANTS, _STEPS, _EVEN = 16384, 64, 16, 8
+# Readings go on for as long as delays may yet move the last instants beyond them, s.
+_BEYOND = 1.0
 
 
-def motion_readings(
-    recording: Recording, *, use_gyro: bool, delay: float, longest: float = 1.0
-) -> tuple[MotionReadings, int]:
-    """Arrays of a recording; call it in double precision (`jax.enable_x64`).
+def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longest: float = 1.0) -> MotionReadings:
+    """Arrays of a recording, of NumPy and in double precision.
 
     Parameters
     ----------
@@ -34,8 +35,6 @@ def motion_readings(
     -------
     readings : MotionReadings
         The arrays.
-    steps : int
-        Steps of an interval that resolve the IMU's samples.
 
     Raises
     ------
@@ -48,7 +47,7 @@ def motion_readings(
     gyro = imu[_GYRO].to_numpy(float) if use_gyro else np.zeros((t.size, 3))
     gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
     readings = np.concatenate([imu[_ACCELEROMETER].to_numpy(float), gyro, np.zeros((t.size, 1))], -1)
-    pad = -t.size % _SAMPLES + 1
+    pad = bucket(t.size + int(np.ceil(_BEYOND / usual)), _SAMPLES) - t.size
     t_padded = np.append(t, t[-1] + usual * np.arange(1, pad + 1))
     readings = np.concatenate([readings, np.repeat(readings[-1:], pad, 0)])
     areas = 0.5 * (readings[1:] + readings[:-1]) * np.diff(t_padded)[:, None]
@@ -75,21 +74,22 @@ def motion_readings(
     there = row >= 0
     v_gnss = np.where(there[:, None], velocity[row], 0.0)
     std = np.where(there[:, None], std[row], np.inf)
-    more = -instant.size % _INSTANTS
     longest = float(np.max(np.diff(np.where(delayed > 0, instant - delay, instant))))
-    steps = int(np.ceil(longest / usual / _STEPS)) * _STEPS
-    arrays = MotionReadings(
-        t=jnp.asarray(t_padded),
-        readings=jnp.asarray(readings),
-        sums=jnp.asarray(sums),
-        instant=jnp.asarray(np.append(instant, np.full(more, t[-1]))),
-        delayed=jnp.asarray(np.append(delayed, np.zeros(more))),
-        v_gnss=jnp.asarray(np.concatenate([v_gnss, np.zeros((more, 3))])),
-        std=jnp.asarray(np.concatenate([std, np.full((more, 3), np.inf)])),
-        spacing=jnp.asarray(spacing),
-        gravity=jnp.asarray(gravity_at(recording)),
+    # As many steps as resolve the IMU's samples, an even number.
+    steps = int(np.ceil(longest / usual / _EVEN)) * _EVEN
+    size = bucket(instant.size, _INSTANTS)
+    return MotionReadings(
+        t=t_padded,
+        readings=readings,
+        sums=sums,
+        instant=padded(instant, size, t[-1]),
+        delayed=padded(delayed, size, 0.0),
+        v_gnss=padded(v_gnss, size, 0.0),
+        std=padded(std, size, np.inf),
+        spacing=np.float64(spacing),
+        share=np.minimum(np.arange(bucket(steps, _STEPS) + 1) / steps, 1.0),
+        gravity=np.float64(gravity_at(recording)),
     )
-    return arrays, steps
 
 
 def _epochs(recording: Recording, start: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

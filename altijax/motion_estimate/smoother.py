@@ -6,6 +6,7 @@ approximation), by which they are chosen.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -14,15 +15,17 @@ from altijax import _safe
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
 from altijax.motion_estimate.model import (
     STATES,
+    Gains,
     Intervals,
     MotionNoise,
     Trajectory,
+    interval_gains,
     motion_measurements,
     motion_transitions,
     moved,
     preintegrated_intervals,
 )
-from altijax.motion_estimate.state_smoother import filter_states, likelihood_gradients, smooth_states
+from altijax.motion_estimate.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 
 # A velocity more than so many standard deviations from what all others say is trusted that much less.
 _GATE = 4.0
@@ -88,13 +91,9 @@ class MotionFit:
     step: jax.Array
 
 
+@jax.jit
 def motion_pass(
-    readings: MotionReadings,
-    trajectory: Trajectory,
-    prior: MotionPrior,
-    noise: MotionNoise,
-    delay: jax.Array,
-    steps: int,
+    readings: MotionReadings, trajectory: Trajectory, prior: MotionPrior, noise: MotionNoise, delay: jax.Array
 ) -> MotionFit:
     """One step of Gauss-Newton from a trajectory, and the likelihood about it with its gradient.
 
@@ -110,8 +109,6 @@ def motion_pass(
         Noise levels.
     delay : () s
         How late the receiver's stamps are.
-    steps : int
-        Steps of each interval.
 
     Returns
     -------
@@ -119,14 +116,20 @@ def motion_pass(
         The next trajectory, covariance and likelihood.
     """
 
-    def model(noise: MotionNoise, delay: jax.Array) -> dict[str, jax.Array]:
-        return _linearised(readings, trajectory, prior, noise, delay, steps)
+    def by_time(delay: jax.Array) -> tuple[Gains, jax.Array]:
+        intervals = intervals_between(readings, instants_at(readings, delay))
+        return interval_gains(trajectory, intervals), _climbing(readings, trajectory, intervals)
 
-    linear, pull_back = jax.vjp(model, noise, delay)
+    # The delay moves every interval at once: one derivative forward through the readings, where one backward would
+    # keep all their steps. What noise levels change is small, and is differentiated backward.
+    timed, timed_by_delay = jax.jvp(by_time, (delay,), (jnp.ones_like(delay),))
+    linear, pull_back = jax.vjp(partial(_linearised, readings, trajectory, prior), noise, timed)
     filtered = filter_states(**linear)
-    x, P = smooth_states(linear["F"], linear["H"], filtered)
-    gradients = likelihood_gradients(linear["F"], linear["H"], filtered)
-    by_noise, by_delay = pull_back(gradients | {"H": jnp.zeros_like(linear["H"])})
+    adjoint = adjoint_states(linear["F"], linear["H"], filtered)
+    x, P = smooth_states(filtered, adjoint)
+    gradients = likelihood_gradients(linear["F"], linear["H"], filtered, adjoint)
+    by_noise, by_timed = pull_back(gradients | {"H": jnp.zeros_like(linear["H"])})
+    by_delay = sum(jax.tree.leaves(jax.tree.map(jnp.vdot, by_timed, timed_by_delay)))
     surprise, doubt = _against_all_others(x, P, linear["z"], linear["R"], prior.doubt, jnp.isfinite(readings.std))
     turn = _safe.norm(x[:, :3])
     # Far from the truth a step may be longer than the linear model reaches.
@@ -143,9 +146,10 @@ def motion_pass(
     )
 
 
+@jax.jit
 def motion_between(
-    readings: MotionReadings, trajectory: Trajectory, delay: jax.Array, steps: int
-) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    readings: MotionReadings, trajectory: Trajectory, delay: jax.Array
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array, jax.Array]:
     """Attitude and velocity at the steps between the instants of a trajectory.
 
     Readings lead from each instant; by how much they miss the next is spread evenly over the interval, which is the
@@ -159,11 +163,11 @@ def motion_between(
         States at the instants.
     delay : () s
         How late the receiver's stamps are.
-    steps : int
-        Steps of each interval.
 
     Returns
     -------
+    instants : (time,) s
+        The instants on the IMU's clock.
     t : (intervals, steps) s
         Time of the end of each step.
     C_nb : (intervals, steps, 3, 3)
@@ -174,15 +178,16 @@ def motion_between(
         Integral of the specific force over each interval, navigation axes.
     """
     instants = instants_at(readings, delay)
-    intervals = intervals_between(readings, instants, steps)
+    intervals = intervals_between(readings, instants)
     preintegrated, _ = preintegrated_intervals(trajectory, intervals)
-    share = (jnp.arange(steps) + 1) / steps
+    share = jnp.asarray(readings.share)[1:]
     later = share * intervals.duration[:, None]
     C = trajectory.C_nb[:-1, None]
     gained = jnp.einsum("kij,ktj->kti", trajectory.C_nb[:-1], preintegrated.velocity)
     v = trajectory.v_n[:-1, None] + gained - later[..., None] * readings.gravity * jnp.array([0.0, 0.0, 1.0])
     miss = trajectory.v_n[1:] - v[:, -1]
-    return instants[:-1, None] + later, C @ preintegrated.C, v + share[:, None] * miss[:, None], gained[:, -1]
+    v = v + share[:, None] * miss[:, None]
+    return instants, instants[:-1, None] + later, C @ preintegrated.C, v, gained[:, -1]
 
 
 def _linearised(
@@ -190,36 +195,34 @@ def _linearised(
     trajectory: Trajectory,
     prior: MotionPrior,
     noise: MotionNoise,
-    delay: jax.Array,
-    steps: int,
+    timed: tuple[Gains, jax.Array],
 ) -> dict[str, jax.Array]:
-    t = instants_at(readings, delay)
-    intervals = intervals_between(readings, t, steps)
-    F, c, Q = motion_transitions(trajectory, intervals, noise, readings.gravity)
-    factor = jnp.stack([jnp.asarray(x, t.dtype) for x in (noise.horizontal, noise.horizontal, noise.vertical)])
+    gains, climbing = timed
+    F, c, Q = motion_transitions(trajectory, gains, noise, readings.gravity)
+    factor = jnp.stack([jnp.asarray(x, F.dtype) for x in (noise.horizontal, noise.horizontal, noise.vertical)])
     there = jnp.isfinite(readings.std)
     variance = jnp.where(there, (factor * jnp.where(there, readings.std, 1)) ** 2 * prior.doubt, jnp.inf)
     used = there[:, 0] & (prior.course > 0)
     slip_variance = jnp.where(used, _SLIP_LEFT**2, jnp.inf)
-    climbing = _climbing(trajectory, intervals, readings.gravity)
     z, H, R = motion_measurements(trajectory, readings.v_gnss, variance, slip_variance, climbing)
     # Constants and biases are believed to be zero before the first measurement; attitude and velocity can be anything.
     first = jnp.concatenate(
         [trajectory.accelerometer_bias[0], trajectory.gyro_bias[0], trajectory.constants, trajectory.slip[0]]
     )
-    x0 = jnp.zeros(STATES, t.dtype).at[6:].set(-first)
+    x0 = jnp.concatenate([jnp.zeros(6, F.dtype), -first])
+    # Slips that no prior covariance tells of have the one that they keep.
     slips = jnp.stack([jnp.asarray(noise.sideslip), jnp.asarray(noise.attack)])
-    P0 = prior.covariance.at[20:, 20:].set(jnp.diag(slips**2))
+    P0 = jnp.asarray(prior.covariance) + jnp.diag(jnp.concatenate([jnp.zeros(STATES - 2, F.dtype), slips**2]))
     return {"F": F, "c": c, "Q": Q, "z": z, "H": H, "R": R, "x0": x0, "P0": P0}
 
 
-def _climbing(trajectory: Trajectory, intervals: Intervals, gravity: jax.Array) -> jax.Array:
+def _climbing(readings: MotionReadings, trajectory: Trajectory, intervals: Intervals) -> jax.Array:
     """Vertical acceleration just before each instant."""
-    steps = intervals.f_b.shape[1]
-    before_end = (1 - (jnp.arange(steps) + 0.5) / steps) * intervals.duration[:, None]
-    weight = (before_end < _JUST_BEFORE).at[:, -1].set(True)
+    begin, end = readings.share[:-1], readings.share[1:]
+    before_end = (1 - 0.5 * (begin + end)) * intervals.duration[:, None]
+    weight = ((before_end < _JUST_BEFORE) | (end >= 1)) * (end > begin)
     f_b = jnp.einsum("kt,kti->ki", weight / jnp.sum(weight, 1, keepdims=True), intervals.f_b)
-    at_end = jnp.einsum("ki,ki->k", trajectory.C_nb[1:, 2], f_b) - gravity
+    at_end = jnp.einsum("ki,ki->k", trajectory.C_nb[1:, 2], f_b) - readings.gravity
     return jnp.append(at_end[:1], at_end)
 
 

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
 from altijax.motion_estimate.model import Trajectory
 from altijax.motion_estimate.preintegration import relative_attitudes
-from altijax.rotations import euler_to_matrix, interpolate_rotations, matrix_to_rotvec, rotvec_to_matrix
+from altijax.rotations import euler_to_matrix, matrix_to_rotvec, rotvec_to_matrix
 from altijax.wahba import fit_windows
 
 # Error of a mean acceleration over one second, m/s^2: Doppler noise and vibration.
@@ -15,8 +15,9 @@ _ACCELERATION_STD = 0.3
 _SLOWEST = 1.0
 
 
+@jax.jit
 def window_attitudes(
-    readings: MotionReadings, delay: jax.Array, prior_std: jax.Array, steps: int, window: int, *, gyro: bool
+    readings: MotionReadings, delay: jax.Array, prior_std: jax.Array, window: jax.Array, gyro: jax.Array
 ) -> tuple[Trajectory, jax.Array, jax.Array]:
     """Attitude at each instant from the epochs around it, level and along the direction of travel beforehand.
 
@@ -28,12 +29,10 @@ def window_attitudes(
         How late the receiver's stamps are.
     prior_std : () rad
         Standard deviation of the attitude believed beforehand.
-    steps : int
-        Steps of each interval, an even number.
-    window : int
+    window : ()
         Epochs that share an attitude, an odd number; 1 for each epoch by itself.
-    gyro : bool
-        Whether the attitude turns within a window as the gyro says.
+    gyro : ()
+        True where the attitude turns as the gyro says; False where there is none and the readings of it are zero.
 
     Returns
     -------
@@ -45,7 +44,7 @@ def window_attitudes(
         Mean square of what the attitudes leave, in units of its variance: least at the right delay.
     """
     t = instants_at(readings, delay)
-    intervals = intervals_between(readings, t, steps)
+    intervals = intervals_between(readings, t)
     v = jax.vmap(_joined, in_axes=(None, 1, 1), out_axes=1)(t, readings.v_gnss, readings.std)
     v_middle = 0.5 * (v[1:] + v[:-1])
     # Before the first and after the last measured velocity nothing is known of the acceleration.
@@ -55,20 +54,19 @@ def window_attitudes(
     f_n = jnp.diff(v, axis=0) / dt[:, None] + jnp.array([0.0, 0.0, 1.0]) * readings.gravity
     std = jnp.where(whole & (intervals.gap == 0), _ACCELERATION_STD / jnp.sqrt(dt), jnp.inf)
 
-    step = (intervals.duration / steps)[:, None, None]
-    C = relative_attitudes(intervals.w_b, step[:, 0, 0])
-    half = C[:, steps // 2 - 1]
-    middles = C @ rotvec_to_matrix(-0.5 * step * intervals.w_b)
-    f_b = jnp.einsum("kji,kj->ki", half, jnp.mean(jnp.einsum("ktij,ktj->kti", middles, intervals.f_b), 1))
+    C = relative_attitudes(intervals.w_b, intervals.dt)
+    half = C[:, jnp.argmin(jnp.abs(readings.share[1:] - 0.5))]
+    middles = C @ rotvec_to_matrix(-0.5 * intervals.dt[..., None] * intervals.w_b)
+    mean = jnp.einsum("ktij,ktj,t->ki", middles, intervals.f_b, jnp.diff(readings.share))
+    f_b = jnp.einsum("kji,kj->ki", half, mean)
     begins = jax.lax.scan(lambda C, by: (C @ by, C), jnp.eye(3, dtype=C.dtype), C[:, -1])[1]
 
     level = jnp.zeros_like(dt)
     C0 = euler_to_matrix(jnp.stack([level, level, _course(v_middle)], -1))
-    shared = fit_windows(
-        f_b, f_n, C0, jnp.full_like(dt, prior_std), std, window=window, C_gyro=begins @ half if gyro else None
-    )
+    # Without a gyro these are attitudes that do not turn.
+    shared = fit_windows(f_b, f_n, C0, jnp.full_like(dt, prior_std), std, window, begins @ half)
     zero = jnp.zeros_like(v)
-    C_nb = _at_instants(t, shared.C_nb, half, C[:, -1], gyro=gyro)
+    C_nb = _at_instants(shared.C_nb, half, C[:, -1], intervals.duration, gyro)
     # Beyond the measured velocities the readings lead on.
     gained = jnp.einsum("kij,kj->ki", shared.C_nb, f_b) - jnp.array([0.0, 0.0, 1.0]) * readings.gravity
     beyond = jnp.cumsum(jnp.where(between[:, None], 0, gained * intervals.duration[:, None]), 0)
@@ -87,16 +85,21 @@ def window_attitudes(
     return trajectory, covariance, misfit
 
 
-def _at_instants(t: jax.Array, C_middle: jax.Array, half: jax.Array, whole: jax.Array, *, gyro: bool) -> jax.Array:
-    """Attitudes at the instants from those amid the intervals: carried by the gyro from both sides and averaged."""
-    if gyro:
-        begin = C_middle @ jnp.swapaxes(half, -1, -2)
-        end = begin @ whole
-        ahead, behind = jnp.concatenate([begin, end[-1:]]), jnp.concatenate([begin[:1], end])
-        return ahead @ rotvec_to_matrix(0.5 * matrix_to_rotvec(jnp.swapaxes(ahead, -1, -2) @ behind))
-    # Intervals of no length would make times repeat.
-    t_middle = 0.5 * (t[1:] + t[:-1])
-    return interpolate_rotations(t, t_middle + 1e-9 * jnp.arange(t_middle.size), C_middle)
+def _at_instants(
+    C_middle: jax.Array, half: jax.Array, whole: jax.Array, duration: jax.Array, gyro: jax.Array
+) -> jax.Array:
+    """Attitudes at the instants from those amid the intervals: carried by the gyro from both sides and averaged.
+
+    Without one the attitude turns evenly from the middle of an interval to that of the next.
+    """
+    begin = C_middle @ jnp.swapaxes(half, -1, -2)
+    end = begin @ whole
+    ahead, behind = jnp.concatenate([begin, end[-1:]]), jnp.concatenate([begin[:1], end])
+    before, after = jnp.append(duration[:1], duration), jnp.append(duration, duration[-1:])
+    even = jnp.where(before + after > 0, after / jnp.where(before + after > 0, before + after, 1), 0.5)
+    part = jnp.where(gyro, 0.5, even)
+    turn = matrix_to_rotvec(jnp.swapaxes(ahead, -1, -2) @ behind)
+    return ahead @ rotvec_to_matrix(part[:, None] * turn)
 
 
 def _joined(t: jax.Array, v: jax.Array, std: jax.Array) -> jax.Array:

@@ -113,8 +113,31 @@ def filter_states(
     return Filtered(x=seen[0], P=seen[1], gain=seen[2], innovation=seen[3], precision=seen[4], log_likelihood=seen[5])
 
 
-def smooth_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> tuple[jax.Array, jax.Array]:
-    """Run the smoother backward over what `filter_states` found.
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Adjoint:
+    """Derivatives of the log-likelihood by each state: what the smoother and the gradients are made of.
+
+    Attributes
+    ----------
+    slope : (time, states)
+        First derivative by the state before the measurement.
+    information : (time, states, states)
+        Second derivative by the same, negated.
+    slope_after : (time, states)
+        First derivative by the state after the measurement.
+    information_after : (time, states, states)
+        Second derivative by the same, negated.
+    """
+
+    slope: jax.Array
+    information: jax.Array
+    slope_after: jax.Array
+    information_after: jax.Array
+
+
+def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> Adjoint:
+    """Run backward over what `filter_states` found.
 
     Parameters
     ----------
@@ -127,10 +150,8 @@ def smooth_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> tuple[jax.A
 
     Returns
     -------
-    x : (time, states)
-        Mean of the state given all measurements.
-    P : (time, states, states)
-        Its covariance.
+    adjoint : Adjoint
+        The derivatives.
 
     Raises
     ------
@@ -140,14 +161,7 @@ def smooth_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> tuple[jax.A
     states = filtered.x.shape[-1]
     F = require_shape("F", F, (None, states, states))
     H = require_shape("H", H, (F.shape[0] + 1, filtered.innovation.shape[-1], states))
-    slope, information, _, _ = _adjoint(F, H, filtered)
-    x = filtered.x + jnp.einsum("tij,tj->ti", filtered.P, slope)
-    return x, filtered.P - filtered.P @ information @ filtered.P
-
-
-def _adjoint(F: jax.Array, H: jax.Array, filtered: Filtered) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
-    """First and negated second derivative of the log-likelihood by the predicted states, then by the updated ones."""
-    identity = jnp.eye(filtered.x.shape[-1], dtype=filtered.x.dtype)
+    identity = jnp.eye(states, dtype=filtered.x.dtype)
 
     def step(later: tuple, inputs: tuple) -> tuple:
         slope, information = later
@@ -162,13 +176,35 @@ def _adjoint(F: jax.Array, H: jax.Array, filtered: Filtered) -> tuple[jax.Array,
     start = jnp.zeros_like(filtered.x[0]), jnp.zeros_like(filtered.P[0])
     after = jnp.concatenate([F, identity[None]])
     seen = (after, H, filtered.gain, filtered.innovation, filtered.precision)
-    return jax.lax.scan(step, start, seen, reverse=True)[1]
+    slope, information, slope_after, information_after = jax.lax.scan(step, start, seen, reverse=True)[1]
+    return Adjoint(slope=slope, information=information, slope_after=slope_after, information_after=information_after)
 
 
-def likelihood_gradients(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> dict[str, jax.Array]:
+def smooth_states(filtered: Filtered, adjoint: Adjoint) -> tuple[jax.Array, jax.Array]:
+    """States given all measurements.
+
+    Parameters
+    ----------
+    filtered : Filtered
+        What the filter found.
+    adjoint : Adjoint
+        What `adjoint_states` made of it.
+
+    Returns
+    -------
+    x : (time, states)
+        Mean of the state given all measurements.
+    P : (time, states, states)
+        Its covariance.
+    """
+    x = filtered.x + jnp.einsum("tij,tj->ti", filtered.P, adjoint.slope)
+    return x, filtered.P - filtered.P @ adjoint.information @ filtered.P
+
+
+def likelihood_gradients(F: ArrayLike, H: ArrayLike, filtered: Filtered, adjoint: Adjoint) -> dict[str, jax.Array]:
     """Derivatives of the sum of log-likelihoods by the arguments of `filter_states` but H.
 
-    Exact, and as cheap as the smoother: its adjoint variables are the derivatives by states and covariances. So the
+    Exact, and cheap beside the smoother: its adjoint variables are the derivatives by states and covariances. So the
     gradient by whatever a model depends on is the vector-Jacobian product of the model alone, no scan within.
 
     Parameters
@@ -179,6 +215,8 @@ def likelihood_gradients(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> dict
         Derivative of the measurements by the state.
     filtered : Filtered
         What the filter found with the same.
+    adjoint : Adjoint
+        What `adjoint_states` made of it.
 
     Returns
     -------
@@ -193,15 +231,17 @@ def likelihood_gradients(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> dict
     states, rows = filtered.x.shape[-1], filtered.innovation.shape[-1]
     F = require_shape("F", F, (None, states, states))
     H = require_shape("H", H, (F.shape[0] + 1, rows, states))
-    slope, information, slope_after, information_after = _adjoint(F, H, filtered)
+    slope, information = adjoint.slope, adjoint.information
     by_P = 0.5 * (slope[:, :, None] * slope[:, None, :] - information)
     gain = filtered.gain
     P_after = filtered.P - gain @ H @ filtered.P
     x_after = filtered.x + jnp.einsum("tij,tj->ti", gain, filtered.innovation)
     by_F = slope[1:, :, None] * x_after[:-1, None, :] + 2 * by_P[1:] @ F @ P_after[:-1]
     # Residual over variance, and its second moment.
-    u = jnp.einsum("tij,tj->ti", filtered.precision, filtered.innovation) - jnp.einsum("tij,ti->tj", gain, slope_after)
-    turned = jnp.swapaxes(gain, -1, -2) @ information_after @ gain
+    u = jnp.einsum("tij,tj->ti", filtered.precision, filtered.innovation) - jnp.einsum(
+        "tij,ti->tj", gain, adjoint.slope_after
+    )
+    turned = jnp.swapaxes(gain, -1, -2) @ adjoint.information_after @ gain
     by_R = 0.5 * (u * u - jnp.diagonal(filtered.precision + turned, axis1=-2, axis2=-1))
     return {
         "F": by_F,

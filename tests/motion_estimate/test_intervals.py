@@ -11,7 +11,7 @@ from altijax.motion_estimate.readings import motion_readings
 from altijax.recordings import Recording
 
 
-def made(gap: bool = False) -> tuple[MotionReadings, int]:
+def made(gap: bool = False) -> MotionReadings:
     t = np.arange(0, 10, 0.02)
     if gap:
         t = t[(t < 4.01) | (t > 4.99)]
@@ -23,18 +23,19 @@ def made(gap: bool = False) -> tuple[MotionReadings, int]:
 
 
 def test_means_of_straight_readings_are_those_at_the_middles() -> None:
-    readings, steps = made()
+    readings = made()
+    steps = np.count_nonzero(np.diff(readings.share))
     t = instants_at(readings, jnp.asarray(0.207))
-    intervals = intervals_between(readings, t, steps)
+    intervals = intervals_between(readings, t)
     middle = t[:-1, None] + intervals.duration[:, None] * (np.arange(steps) + 0.5) / steps
     whole = np.asarray(intervals.duration) > 0
-    np.testing.assert_allclose(intervals.f_b[..., 0][whole], middle[whole], atol=1e-9)
-    np.testing.assert_allclose(intervals.w_b[..., 2][whole], -0.03 * middle[whole], atol=1e-9)
+    np.testing.assert_allclose(intervals.f_b[:, :steps, 0][whole], middle[whole], atol=1e-9)
+    np.testing.assert_allclose(intervals.w_b[:, :steps, 2][whole], -0.03 * middle[whole], atol=1e-9)
     assert not intervals.gap.any()
 
 
 def test_instants_follow_the_delay_and_stay_in_order() -> None:
-    readings, _ = made()
+    readings = made()
     there = np.isfinite(np.asarray(readings.std)[:, 0])
     np.testing.assert_allclose(np.asarray(instants_at(readings, jnp.asarray(0.25)))[there], np.arange(0.45, 8.5, 1.0))
     late = instants_at(replace(readings, instant=readings.instant), jnp.asarray(3.0))
@@ -43,7 +44,7 @@ def test_instants_follow_the_delay_and_stay_in_order() -> None:
 
 
 def test_a_gap_of_the_imu_is_counted() -> None:
-    readings, steps = made(gap=True)
-    intervals = intervals_between(readings, instants_at(readings, jnp.asarray(0.2)), steps)
+    readings = made(gap=True)
+    intervals = intervals_between(readings, instants_at(readings, jnp.asarray(0.2)))
     assert abs(float(intervals.gap.sum()) - 1.0) < 0.03
     assert float(intervals.gap.max()) > 0.45

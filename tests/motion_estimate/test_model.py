@@ -11,6 +11,7 @@ from altijax.motion_estimate.model import (
     Intervals,
     MotionNoise,
     Trajectory,
+    interval_gains,
     motion_measurements,
     motion_transitions,
     moved,
@@ -27,6 +28,7 @@ def interval() -> tuple[Trajectory, Intervals]:
     intervals = Intervals(
         f_b=jnp.asarray([[0.5, 1.0, 9.5] + 0.5 * RNG.normal(size=(STEPS, 3))]),
         w_b=jnp.asarray([[0.1, -0.05, 0.3] + 0.1 * RNG.normal(size=(STEPS, 3))]),
+        dt=jnp.full((1, STEPS), 1 / STEPS),
         duration=jnp.ones(1),
         gap=jnp.zeros(1),
     )
@@ -57,23 +59,19 @@ def obeying(trajectory: Trajectory, intervals: Intervals) -> Trajectory:
 
 def test_a_trajectory_that_obeys_its_readings_misses_nothing() -> None:
     trajectory, intervals = interval()
-    _, c, _ = motion_transitions(trajectory, intervals, MotionNoise(), GRAVITY)
+    _, c, _ = motion_transitions(trajectory, interval_gains(trajectory, intervals), MotionNoise(), GRAVITY)
     np.testing.assert_allclose(c, 0, atol=1e-10)
 
 
 def test_transition_carries_small_errors_as_the_motion_does() -> None:
     """Errors of the first instant, led to the second by the readings, arrive there as F says, to second order."""
     trajectory, intervals = interval()
-    F, _, _ = motion_transitions(trajectory, intervals, MotionNoise(), GRAVITY)
+    F, _, _ = motion_transitions(trajectory, interval_gains(trajectory, intervals), MotionNoise(), GRAVITY)
     x = 1e-4 * RNG.normal(size=STATES)
     both = jnp.stack([jnp.asarray(x), jnp.asarray(np.r_[np.zeros(6), x[6:]])])
     led = obeying(moved(trajectory, both), intervals)
-    _, c, _ = motion_transitions(
-        replace(led, C_nb=led.C_nb.at[1].set(trajectory.C_nb[1]), v_n=led.v_n.at[1].set(trajectory.v_n[1])),
-        intervals,
-        MotionNoise(),
-        GRAVITY,
-    )
+    ended = replace(led, C_nb=led.C_nb.at[1].set(trajectory.C_nb[1]), v_n=led.v_n.at[1].set(trajectory.v_n[1]))
+    _, c, _ = motion_transitions(ended, interval_gains(ended, intervals), MotionNoise(), GRAVITY)
     expected = (F[0] @ x)[:6]
     np.testing.assert_allclose(led.v_n[1] - trajectory.v_n[1], expected[3:], atol=3e-6)
     np.testing.assert_allclose(c[0, :3], expected[:3], atol=3e-6)

@@ -10,6 +10,7 @@ from altijax.rotations import matrix_to_rotvec, rotvec_to_matrix
 
 relative_attitudes, preintegrate = jax.jit(preintegration.relative_attitudes), jax.jit(preintegration.preintegrate)
 STEPS, DT = 40, 0.025
+LENGTHS = np.full(STEPS, DT)
 RNG = np.random.default_rng(3)
 F_B = np.array([0.5, -0.3, 9.8]) + np.cumsum(0.2 * RNG.normal(size=(STEPS, 3)), 0)
 W_B = np.cumsum(0.05 * RNG.normal(size=(STEPS, 3)), 0)
@@ -17,14 +18,14 @@ W_B = np.cumsum(0.05 * RNG.normal(size=(STEPS, 3)), 0)
 
 def gained(gyro: jax.Array, bias: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array]:
     w_b, f_b = W_B * (1 + gyro[3:]) - gyro[:3], F_B - bias
-    C = relative_attitudes(w_b, DT)
-    whole = preintegrate(f_b, w_b, C, turn, DT)
+    C = relative_attitudes(w_b, LENGTHS)
+    whole = preintegrate(f_b, w_b, C, turn, LENGTHS)
     return whole.C[-1], whole.velocity[-1]
 
 
 def test_a_constant_rate_is_a_rotation_by_its_angle() -> None:
     rate = np.array([0.4, -1.0, 0.7])
-    C = relative_attitudes(np.tile(rate, (STEPS, 1)), DT)
+    C = relative_attitudes(np.tile(rate, (STEPS, 1)), LENGTHS)
     expected = [Rotation.from_rotvec(rate * DT * (k + 1)).as_matrix() for k in range(STEPS)]
     np.testing.assert_allclose(C, expected, atol=1e-13)
 
@@ -33,13 +34,13 @@ def test_a_constant_force_is_turned_with_the_body() -> None:
     """About z: the integral of (cos wt, sin wt) f is (sin wT, 1 - cos wT) f / w."""
     rate, T = 0.8, STEPS * DT
     w_b, f_b = np.tile([0.0, 0.0, rate], (STEPS, 1)), np.tile([2.0, 0.0, 0.0], (STEPS, 1))
-    velocity = preintegrate(f_b, w_b, relative_attitudes(w_b, DT), np.zeros(3), DT).velocity[-1]
+    velocity = preintegrate(f_b, w_b, relative_attitudes(w_b, LENGTHS), np.zeros(3), LENGTHS).velocity[-1]
     np.testing.assert_allclose(velocity, [2 * np.sin(rate * T) / rate, 2 * (1 - np.cos(rate * T)) / rate, 0], atol=5e-5)
 
 
 def test_derivatives_are_those_of_differentiation() -> None:
     """To the size of the step, which is neglected within a step."""
-    whole = preintegrate(F_B, W_B, relative_attitudes(W_B, DT), np.zeros(3), DT)
+    whole = preintegrate(F_B, W_B, relative_attitudes(W_B, LENGTHS), np.zeros(3), LENGTHS)
     C_end = whole.C[-1]
     zeros = jnp.zeros(6), jnp.zeros(3), jnp.zeros(3)
 
@@ -57,6 +58,6 @@ def test_derivatives_are_those_of_differentiation() -> None:
 
 def test_the_turn_ends_where_it_should() -> None:
     turn = np.array([0.02, -0.3, 0.1])
-    C = relative_attitudes(W_B, DT)
-    whole = preintegrate(F_B, W_B, C, turn, DT)
+    C = relative_attitudes(W_B, LENGTHS)
+    whole = preintegrate(F_B, W_B, C, turn, LENGTHS)
     np.testing.assert_allclose(whole.C[-1], rotvec_to_matrix(turn) @ C[-1], atol=1e-13)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from altijax.motion_estimate.state_smoother import filter_states, likelihood_gradients, smooth_states
+from altijax.motion_estimate.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 
 T, N, ROWS = 6, 4, 2
 NAMES = ("F", "c", "Q", "z", "H", "R", "x0", "P0")
@@ -55,7 +55,7 @@ def dense(model: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
 
 def test_smoother_and_likelihood_are_those_of_the_dense_gaussian(model: dict[str, np.ndarray]) -> None:
     filtered = filter_states(**model)
-    x, P = smooth_states(model["F"], model["H"], filtered)
+    x, P = smooth_states(filtered, adjoint_states(model["F"], model["H"], filtered))
     mean, cov, density = dense(model)
     np.testing.assert_allclose(x, mean, atol=1e-12)
     blocks = [cov[k * N : (k + 1) * N, k * N : (k + 1) * N] for k in range(T)]
@@ -66,7 +66,9 @@ def test_smoother_and_likelihood_are_those_of_the_dense_gaussian(model: dict[str
 
 
 def test_gradients_are_those_of_differentiation(model: dict[str, np.ndarray]) -> None:
-    ours = likelihood_gradients(model["F"], model["H"], filter_states(**model))
+    filtered = filter_states(**model)
+    adjoint = adjoint_states(model["F"], model["H"], filtered)
+    ours = likelihood_gradients(model["F"], model["H"], filtered, adjoint)
     inputs = {name: jnp.asarray(value) for name, value in model.items()}
     theirs = jax.grad(lambda m: jnp.sum(filter_states(**m).log_likelihood))(inputs)
     assert set(ours) == set(NAMES) - {"H"}
