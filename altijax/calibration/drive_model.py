@@ -25,7 +25,6 @@ import jax
 import jax.numpy as jnp
 
 from altijax.rotations import euler_to_matrix, rotvec_to_matrix
-from altijax.sensors import Accelerometer, Gyro, correct_accelerometer, correct_gyro
 
 DRIVE_PARAMETERS = {
     "wheel_scale": (1.0, 0.03, "1"),
@@ -150,81 +149,139 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
         East, North and up of all epochs, then wheel, sideways, upwards and right less left wheel of all samples.
     """
     p = dict(zip(DRIVE_PARAMETERS, parameters, strict=True))
-    v_antenna, v_wheels = _motion(p, own, stretch)
-    at_epochs = _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:]
-    gnss = (stretch.v_gnss - at_epochs) / stretch.gnss_std[:, jnp.asarray([0, 0, 1])]
-    turned = v_wheels[:, 0] * -p["wheel_difference"] + p["track_width"] * v_wheels[:, 3]
-    rolled = jnp.stack([v_wheels[:, 0], turned], -1)
-    bend = jnp.pad(jnp.diff(rolled, 2, axis=0), ((1, 1), (0, 0))) / STEP**2
-    rolled, bend = jnp.split(_at(stretch.t_wheel - p["wheel_delay"], jnp.concatenate([rolled, bend], -1)), 2, -1)
-    rolled = rolled + stretch.wheel_spread[:, None] ** 2 / 2 * bend
+    axes, v_antenna, rolled, still = _motion(p, own, stretch)
+    at_epochs = axes @ _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:, None]
+    gnss = (stretch.v_gnss.T - at_epochs) / jnp.repeat(stretch.gnss_std.T, jnp.asarray([2, 1]), 0, total_repeat_length=3)
+    bend = jnp.pad(rolled[:, 2:] - 2 * rolled[:, 1:-1] + rolled[:, :-2], ((0, 0), (1, 1))) / STEP**2
+    rolled, bend = jnp.split(_at(stretch.t_wheel - p["wheel_delay"], jnp.concatenate([rolled, bend])), 2)
+    rolled = rolled + stretch.wheel_spread**2 / 2 * bend
     # Standing still sideways and upwards holds at any time, whatever the wheels' stamps.
-    still = _at(stretch.t_wheel, v_wheels[:, 1:3])
-    at_samples = jnp.concatenate([rolled[:, :1], still, rolled[:, 1:]], -1)
-    none = jnp.zeros_like(stretch.wheel)
-    shown = p["wheel_scale"] * jnp.stack([stretch.wheel, none, none, stretch.apart], -1)
-    wheel = (shown - at_samples) / stretch.wheel_std
-    return jnp.concatenate([gnss.T.reshape(-1), wheel.T.reshape(-1)])
+    still = _at(stretch.t_wheel, still)
+    shown = p["wheel_scale"] * jnp.stack([stretch.wheel, stretch.apart])
+    wheel = jnp.concatenate([shown[:1] - rolled[:1], -still, shown[1:] - rolled[1:]]) / stretch.wheel_std.T
+    return jnp.concatenate([gnss.reshape(-1), wheel.reshape(-1)])
 
 
-def _motion(p: dict[str, jax.Array], own: jax.Array, stretch: Stretch) -> tuple[jax.Array, jax.Array]:
-    """Velocity (steps + 1, 3) of the antenna in navigation axes; speed, left, up and rate of turn (steps + 1, 4)."""
-    bias, scale, gyro_bias = (
-        jnp.stack([p[f"accelerometer_bias_{axis}"] for axis in "xyz"]),
-        p["accelerometer_scale"],
-        jnp.stack([p[f"gyro_bias_{axis}"] for axis in "xyz"]),
-    )
-    f = correct_accelerometer(Accelerometer(bias=bias, scale=scale), stretch.f)
-    gyro_scale = jnp.stack([jnp.ones_like(p["gyro_scale_z"])] * 2 + [p["gyro_scale_z"]])
-    w = correct_gyro(Gyro(bias=gyro_bias, scale=gyro_scale), stretch.w, f)
-    start, drifts = own[:6], own[6:-3].reshape(-1, 6)
-    turns = jax.lax.associative_scan(_product, rotvec_to_matrix(w * STEP))
-    turns = _product(stretch.C_nb, jnp.concatenate([jnp.eye(3, dtype=f.dtype)[None], turns]))
-    first_turn = rotvec_to_matrix(start[:3])
+def _motion(
+    p: dict[str, jax.Array], own: jax.Array, stretch: Stretch
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """The motion at the ends of the steps, in the axes that the vehicle has at the start of the stretch.
+
+    Returns these axes in navigation axes (3, 3); in them, the velocity of the antenna (3, nodes); in the axes that the
+    vehicle has then, what the wheels show, speed and right less left (2, nodes), and the velocity left and up
+    (2, nodes). So what a stretch has of its own enters by a few vectors, and the turns depend on the gyros alone.
+    """
+    bias, gyro_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
+    one = jnp.ones_like(p["gyro_scale_z"])
+    mounting = euler_to_matrix(jnp.stack([0 * one, p["mounting_pitch"], p["mounting_yaw"]]))
+    f = mounting @ (stretch.f.T / p["accelerometer_scale"] - bias[:, None])
+    w = mounting @ (stretch.w.T / jnp.stack([one, one, p["gyro_scale_z"]])[:, None] - gyro_bias[:, None])
+    axes = rotvec_to_matrix(own[:3]) @ stretch.C_nb @ mounting.T
+    turn = w * STEP
+    turns = _turns(turn)
     # Constant rate and force in the body during a step: to first order the force is turned by half the step.
-    force = _turned(turns[:-1], f + jnp.cross(w, f) * STEP / 2) @ first_turn.T
-    # Drifts are so small that they add up as vectors.
-    drift = drifts[jnp.arange(f.shape[0]) // STEPS_OF_INTERVAL] * jnp.repeat(stretch.noise[:2], 3)
-    drift = drift * (STEP / STEPS_OF_INTERVAL) ** 0.5
-    tilt = jnp.concatenate([jnp.zeros((1, 3), f.dtype), jnp.cumsum(drift[:, :3], 0)])
-    force = force + jnp.cross((tilt[:-1] + tilt[1:]) / 2, force)
-    change = (force - jnp.stack([0 * stretch.gravity, 0 * stretch.gravity, stretch.gravity])) * STEP + drift[:, 3:]
-    v_n = start[3:] + jnp.concatenate([jnp.zeros((1, 3), f.dtype), jnp.cumsum(change, 0)])
-    mounting = euler_to_matrix(jnp.stack([0 * p["mounting_pitch"], p["mounting_pitch"], p["mounting_yaw"]]))
-    v_level = (v_n - jnp.cross(tilt, v_n)) @ first_turn
-    v_vehicle = _turned(jnp.swapaxes(turns, -1, -2), v_level) @ mounting.T
+    force = _onward(turns, turn, f + _cross(w, f) * STEP / 2)
+    # Drifts are so small that they add up as vectors, evenly within each interval.
+    drifts = own[6:-3].reshape(-1, 2, 3) * stretch.noise[:2, None] * (STEP * STEPS_OF_INTERVAL) ** 0.5 @ axes
+    steps = jnp.arange(f.shape[1] + 1, dtype=f.dtype)
+    passed = jnp.clip(steps / STEPS_OF_INTERVAL - jnp.arange(drifts.shape[0], dtype=f.dtype)[:, None], 0, 1)
+    tilt, kicks = drifts[:, 0].T @ passed, drifts[:, 1].T @ passed
+    force = force + _cross((tilt[:, :-1] + tilt[:, 1:]) / 2, force)
+    coasting = (own[3:6] @ axes)[:, None] - (stretch.gravity * axes[2])[:, None] * (STEP * steps)
+    v = coasting + _sums(force) * STEP + kicks
+    forward, left, up = _back(turns, turn, v - _cross(tilt, v))
     # Rates at the ends of the steps, and by them the velocity of a point one metre ahead of another.
-    w = (jnp.concatenate([w[:1], w]) + jnp.concatenate([w, w[-1:]])) / 2 @ mounting.T
-    per_metre = jnp.stack([jnp.zeros_like(w[:, 0]), w[:, 2], -w[:, 1]], -1)
-    v_antenna = v_n + p["antenna_lever_arm"] * (_turned(turns, per_metre @ mounting) @ first_turn.T)
-    forward, left, up = (v_vehicle - p["lever_arm"] * per_metre).T
-    nodes = jnp.arange(forward.size)
-    before, after = jnp.maximum(nodes - _LOOK, 0), jnp.minimum(nodes + _LOOK, forward.size - 1)
+    w = jnp.concatenate([w[:, :1], (w[:, 1:] + w[:, :-1]) / 2, w[:, -1:]], 1)
+    per_metre = jnp.stack([0 * steps, w[2], -w[1]])
+    v_antenna = v + p["antenna_lever_arm"] * _onward(turns, turn, per_metre)
+    left, up = left - p["lever_arm"] * w[2], up + p["lever_arm"] * w[1]
+    nodes = jnp.arange(steps.size)
+    before, after = jnp.maximum(nodes - _LOOK, 0), jnp.minimum(nodes + _LOOK, steps.size - 1)
     acceleration = (forward[after] - forward[before]) / ((after - before) * STEP)
     squat = p["weight_transfer"] / stretch.gravity * acceleration
     cos, sin = jnp.cos(squat), jnp.sin(squat)
     forward, up = forward * cos - up * sin, forward * sin + up * cos
     shown = forward * (1 + p["wheel_slip"] * acceleration)
-    return v_antenna, jnp.stack([shown, left, up, w[:, 2]], -1)
+    apart = p["track_width"] * w[2] - p["wheel_difference"] * shown
+    return axes, v_antenna, jnp.stack([shown, apart]), jnp.stack([left, up])
 
 
-def _product(a: jax.Array, b: jax.Array) -> jax.Array:
-    """Matrix product without a call of a matrix routine for each of many small matrices."""
-    return jnp.sum(a[..., :, :, None] * b[..., None, :, :], -2)
+def _turns(turn: jax.Array) -> jax.Array:
+    """Attitudes (3, 3, nodes) seen from the first one after steps that turn by rotation vectors (3, steps).
+
+    Without derivatives: `_onward` and `_back` have them.
+    """
+
+    def step(C: jax.Array, change: jax.Array) -> tuple[jax.Array, jax.Array]:
+        return jnp.sum(C[:, :, None] * change, 1), C
+
+    first = jnp.eye(3, dtype=turn.dtype)
+    last, before = jax.lax.scan(step, first, rotvec_to_matrix(jax.lax.stop_gradient(turn).T))
+    return jnp.moveaxis(jnp.concatenate([before, last[None]]), 0, -1)
 
 
-def _turned(matrices: jax.Array, vectors: jax.Array) -> jax.Array:
-    return jnp.sum(matrices * vectors[..., None, :], -1)
+@jax.custom_jvp
+def _onward(turns: jax.Array, turn: jax.Array, vectors: jax.Array) -> jax.Array:
+    """Vectors (3, steps or nodes) in the first axes, of components in those of the time; `turns` are ``_turns(turn)``.
+
+    What changes a turn on the way turns all that comes after it by a sum of small vectors: differentiated as a product
+    of matrices it would be nine numbers a node and many times the work.
+    """
+    del turn
+    C = turns[:, :, : vectors.shape[1]]
+    return C[:, 0] * vectors[0] + C[:, 1] * vectors[1] + C[:, 2] * vectors[2]
+
+
+@_onward.defjvp
+def _onward_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    turns, turn, vectors = primals
+    found = _onward(*primals)
+    turned = _turned_more(turns, turn, tangents[1])[:, : vectors.shape[1]]
+    return found, _onward(turns, turn, tangents[2]) + _cross(turned, found)
+
+
+@jax.custom_jvp
+def _back(turns: jax.Array, turn: jax.Array, vectors: jax.Array) -> jax.Array:
+    """Components (3, nodes) in the axes of the time, of vectors in the first ones."""
+    del turn
+    return turns[0] * vectors[0] + turns[1] * vectors[1] + turns[2] * vectors[2]
+
+
+@_back.defjvp
+def _back_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    turns, turn, vectors = primals
+    turned = _turned_more(turns, turn, tangents[1])
+    return _back(*primals), _back(turns, turn, tangents[2] - _cross(turned, vectors))
+
+
+def _turned_more(turns: jax.Array, turn: jax.Array, change: jax.Array) -> jax.Array:
+    """By how much more (3, nodes) the attitudes are turned, in the first axes, if the steps' rotation vectors change."""
+    squared = jnp.sum(turn * turn, 0)
+    # A step turns by a small angle a: (1 - cos a) / a^2 and (a - sin a) / a^3 by their series.
+    versine = 1 / 2 - squared / 24 * (1 - squared / 30 * (1 - squared / 56))
+    excess = 1 / 6 - squared / 120 * (1 - squared / 42 * (1 - squared / 72))
+    across = _cross(turn, change)
+    return _sums(_onward(turns, turn, change + versine * across + excess * _cross(turn, across)))
+
+
+def _sums(values: jax.Array) -> jax.Array:
+    """Running sums along the last axis, from zero."""
+    return jnp.pad(jnp.cumsum(values, -1), ((0, 0), (1, 0)))
+
+
+def _cross(a: jax.Array, b: jax.Array) -> jax.Array:
+    return jnp.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
 
 
 def _at(t: jax.Array, values: jax.Array) -> jax.Array:
-    """Rows of a uniform series at other times, by Catmull and Rom's cubic.
+    """Uniform series (rows, nodes) at other times, by Catmull and Rom's cubic.
 
     Its slope is continuous in the time: else a delay finds a minimum of its own wherever neighbours change.
     """
-    place = jnp.clip(t / STEP, 0, values.shape[0] - 1)
-    i = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 1, values.shape[0] - 3)
-    x = (place - i)[:, None]
-    a, b, c, d = (values[i + k] for k in (-1, 0, 1, 2))
-    slope = (c - a) / 2
-    return b + x * (slope + x * (a - 2.5 * b + 2 * c - d / 2 + x * (1.5 * (b - c) + (d - a) / 2)))
+    place = jnp.clip(t / STEP, 0, values.shape[1] - 1)
+    i = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 1, values.shape[1] - 3)
+    x = place - i
+    # Weights of the four neighbours, by powers of the place between the inner two.
+    cubic = jnp.asarray([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], values.dtype) / 2
+    weights = cubic @ jnp.stack([jnp.ones_like(x), x, x * x, x * x * x])
+    return jnp.sum(weights * values[:, i + jnp.arange(-1, 3)[:, None]], 1)
