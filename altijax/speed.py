@@ -310,6 +310,7 @@ def speed_with_aided_roll(
     return speed, pitch, *roll_angle(f_y, w_z, inside, pitch, gravity)
 
 
+@jax.jit
 def speed_error_growth(yaw_rate: ArrayLike, dt: ArrayLike) -> tuple[jax.Array, jax.Array]:
     """How errors grow in the loop of `speed_with_roll`, by its linearised equation ``dv'' = w_z^2 dv``.
 

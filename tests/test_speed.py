@@ -7,8 +7,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from altijax import speed
 from altijax.motions import ideal_readings, road_pose
@@ -428,3 +427,21 @@ def test_wrong_shapes_are_named():
         speed_with_roll(*SHORT, START[0][None], *START[1:])
     with pytest.raises(ValueError, match=r"aided must have shape \(60,\)"):
         speed_with_aided_roll(*SHORT, GAPS[0], True, *START)
+
+
+@pytest.mark.parametrize("stepping", STEPPINGS)
+def test_what_a_series_is_filled_up_with_changes_nothing_before(stepping):
+    series = sensors(BENDS)
+    filled = [jnp.concatenate([x, jnp.full(2191, x[-1])]) for x in series]
+    start = *initial(BENDS), G, DT, stepping
+    aid = BENDS.speed, jnp.ones(T.size)
+    filled_aid = [jnp.concatenate([x, jnp.full(2191, x[-1])]) for x in aid]
+    pairs = [
+        (speed_without_roll(filled[0], filled[2], *start), speed_without_roll(series[0], series[2], *start)),
+        (speed_with_roll(*filled, *start), speed_with_roll(*series, *start)),
+        (speed_with_aided_roll(*filled, *filled_aid, *start), speed_with_aided_roll(*series, *aid, *start)),
+        (speed_error_growth(filled[3], DT), speed_error_growth(series[3], DT)),
+    ]
+    for longer, alone in pairs:
+        for x, y in zip(longer, alone, strict=True):
+            np.testing.assert_allclose(x[: T.size], y, rtol=1e-12, atol=1e-12)

@@ -6,7 +6,7 @@ its constants by itself from any aid: here the reference is the aid. What belong
 scale and the delays, is found from the aid against the reference, the same for all methods.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,15 +15,16 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.parameters import ACCEPTED, PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
 from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
 from altijax.calibration.shared_parameters import fit_shared
 from altijax.drives import gravity_at, imu_of, start_of
+from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 from altijax.rotations import euler_to_matrix
 from altijax.sensors import Accelerometer, Gyro, correct_accelerometer, correct_gyro
-from altijax.signals import interval_means
+from altijax.series import interpolated, means_between
 from altijax.speed import speed_with_aided_roll, speed_with_roll, speed_without_roll
 from altijax.speed_estimate.estimates import (
     AUTO_SENSORS,
@@ -32,9 +33,11 @@ from altijax.speed_estimate.estimates import (
     fit_noise,
     on_imu,
     run_filter,
+    samples_between,
 )
 from altijax.speed_estimate.model import STATES, state_names
 from altijax.speed_estimate.steps import aid_of, drive_in_steps, initial_state, speed_of
+from altijax.stages import stages, tracked
 
 STRETCH = 20.0
 """Length of a stretch, s: long enough for a gyro's bias, short against the growth of errors in turns."""
@@ -43,24 +46,42 @@ OUTAGE = 10.0
 """Length of the outages in which a calibration is judged, s."""
 
 _OF_THE_AID = ("wheel_scale", "wheel_delay", "gnss_delay")
+_OF_THE_IMU = tuple(name for name in ACCEPTED["roll"] if name not in _OF_THE_AID)
 _STEP, _EVERY = 0.05, 10
 # A reference that far away says nothing of the speed, s.
 _NEAR = 1.0
 # What a stretch begins with: standard deviations of speed (m/s) and pitch (rad) about the first guess.
 _OWN_STD = (1.0, 0.1)
+# The smallest numbers of stretches, and of speeds of an aid, that arrays are filled up to.
+_FEW, _SPEEDS = 4, 1024
 # The filter's names of constants that it sees from the other side.
 _MIRRORED = {"mounting_yaw": "travel_yaw"}
+
+Array = jax.Array | np.ndarray
 
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, kw_only=True)
 class _Stretches:
-    f: jax.Array
-    w: jax.Array
-    gravity: jax.Array
-    inside: jax.Array  # reference speed at every node, for the roll of "aided"
-    speed: jax.Array  # the same at every tenth
-    weight: jax.Array  # 1 or 0 over the standard deviation
+    f: Array
+    w: Array
+    gravity: Array
+    inside: Array  # reference speed at every node, for the roll of "aided"
+    speed: Array  # the same at every tenth
+    weight: Array  # 1 or 0 over the standard deviation
+
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class _Aids:
+    """Speeds of the aid and the reference by recording, filled up; what is weighted with zero does not count."""
+
+    by_wheel: Array
+    t: Array
+    speed: Array
+    weight: Array
+    t_aid: Array
+    aid: Array
 
 
 def calibrate_speed(
@@ -92,14 +113,16 @@ def calibrate_speed(
     """
     of_aid = [name for name in names if name in _OF_THE_AID]
     of_imu = [name for name in names if name not in _OF_THE_AID]
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), stages(f"{method} calibrated") as stage:
         references = [_reference(recording) for recording in recordings]
         ends = [np.inf if until is None else until - start_of(recording) for recording in recordings]
         parts, rows = [], []
         if of_imu:
+            stage("constants of the IMU")
             fit = _from_filter if method == "filter" else _from_stretches
             parts.append(fit(recordings, references, ends, of_imu, method))
         if of_aid:
+            stage("constants of the aid")
             found, judged = _from_aid(recordings, references, ends, of_aid, method)
             parts.append(found)
             rows += judged
@@ -144,14 +167,42 @@ def _from_stretches(
     ]
     if not pieces:
         raise ValueError(f"method {method!r} needs a reference speed for {STRETCH:g} s before the end of the fit")
-    stretches = jax.tree.map(lambda *leaves: jnp.stack(leaves), *(data for data, _ in pieces))
-    own0 = jnp.asarray(np.stack([guess for _, guess in pieces]))
-    known = PARAMETERS.loc[names]
-    mean, unit = (jnp.asarray(known[column].to_numpy(float)) for column in ("nominal", "uncertainty"))
-    static = {"names": tuple(names), "method": method}
-    first = _solve(jnp.zeros(len(names)), jnp.ones(1), stretches, own0, mean, 0 * unit, **static)[2]
-    fit = fit_to_reference(lambda x, noise: _solve(x, noise, stretches, own0, mean, unit, **static), len(names), first)
+    # more stretches that say nothing, as programs are compiled for a number of them
+    size = bucket(len(pieces), _FEW)
+    stretches = jax.tree.map(lambda *leaves: padded(np.stack(leaves), size), *(data for data, _ in pieces))
+    known = padded(np.ones(len(pieces)), size, 0.0)
+    stretches = replace(stretches, weight=known[:, None] * stretches.weight)
+    own0 = padded(np.stack([guess for _, guess in pieces]), size)
+    mean, unit = _priors(_OF_THE_IMU, names)
+
+    def solve(x: np.ndarray, noise: np.ndarray, unit: np.ndarray = unit) -> Found:
+        return _solve(x, noise, stretches, own0, mean, unit, method=method)
+
+    first = solve(0 * mean, np.ones(1), 0 * unit)[2]
+    fit = fit_to_reference(_of_some(_OF_THE_IMU, names, solve), len(names), first)
     return calibration_from(method, names, fit.x, fit.covariance, pd.DataFrame())
+
+
+def _priors(names: Sequence[str], wanted: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
+    """Prior means, and standard deviations that are zero for what is not wanted and so stays known."""
+    known = PARAMETERS.loc[list(names)]
+    unit = known["uncertainty"].where(known.index.isin(wanted), 0.0)
+    return known["nominal"].to_numpy(float), unit.to_numpy(float)
+
+
+def _of_some(
+    names: Sequence[str], wanted: Sequence[str], solve: Callable[[np.ndarray, np.ndarray], Found]
+) -> Callable[[Array, Array], Found]:
+    """A fit of the constants that are wanted, from one of all."""
+    rows = [names.index(name) for name in wanted]
+
+    def of_wanted(x: Array, noise: Array) -> Found:
+        x0 = np.zeros(len(names))
+        x0[rows] = x
+        found, covariance, residuals = solve(x0, np.asarray(noise))
+        return np.asarray(found)[rows], np.asarray(covariance)[np.ix_(rows, rows)], residuals
+
+    return of_wanted
 
 
 def _stretches(
@@ -164,6 +215,7 @@ def _stretches(
         raise ValueError(f"recording {recording.name!r} has no gyro (gx, gy, gz in the IMU), which a speed needs")
     nodes = _STEP * np.arange(round(STRETCH / _STEP) + 1)
     gravity = gravity_at(recording)
+    values = imu[["ax", "ay", "az", "gx", "gy", "gz"]].to_numpy(float)
     found = []
     for start in np.arange(t[0], min(end, t[-1], reference[0][-1]) - STRETCH + 1e-9, STRETCH):
         inside = t[(t >= start) & (t <= start + STRETCH)]
@@ -171,22 +223,24 @@ def _stretches(
         if np.max(np.diff(inside), initial=0.0) > 5 * _STEP or near.mean() < 0.5:
             continue
         edges = start + np.append(nodes - _STEP / 2, nodes[-1] + _STEP / 2)
-        readings = (interval_means(t, imu[["ax", "ay", "az", "gx", "gy", "gz"]].to_numpy(float).T, edges)).T
+        # the edges among the samples make the means exact
+        times = np.union1d(edges, t[(t > edges[0]) & (t < edges[-1])])
+        readings = means_between(edges, times, interpolated(times, t, values))
         gained = (speed[4] - speed[0]) / (4 * _EVERY * _STEP)
         force = readings[: 4 * _EVERY, 0].mean() - gained
         data = _Stretches(
             f=readings[:, :3],
             w=readings[:, 3:],
-            gravity=jnp.asarray(gravity),
-            inside=jnp.asarray(np.interp(start + nodes, *reference)),
-            speed=jnp.asarray(np.where(near, speed, 0.0)),
-            weight=jnp.asarray(near.astype(float)),
+            gravity=np.asarray(gravity),
+            inside=np.interp(start + nodes, *reference),
+            speed=np.where(near, speed, 0.0),
+            weight=near.astype(float),
         )
         found.append((data, np.array([speed[0], np.arcsin(np.clip(force / gravity, -0.5, 0.5))])))
     return found
 
 
-@partial(jax.jit, static_argnames=("names", "method"))
+@partial(jax.jit, static_argnames="method")
 def _solve(
     x0: jax.Array,
     noise: jax.Array,
@@ -194,29 +248,28 @@ def _solve(
     own0: jax.Array,
     mean: jax.Array,
     unit: jax.Array,
-    names: tuple[str, ...],
     method: str,
 ) -> Found:
     """The constants in units of their priors, each stretch's own speed and pitch averaged over."""
     weighted = replace(stretches, weight=stretches.weight / noise[0])
 
     def residual(x: jax.Array, own: jax.Array, stretch: _Stretches) -> jax.Array:
-        values = dict(zip(names, mean + unit * x, strict=True))
-        return stretch.weight * (_dead_reckoned(values, own, stretch, method) - stretch.speed)
+        values = dict(zip(_OF_THE_IMU, mean + unit * x, strict=True))
+        return jnp.asarray(stretch.weight) * (_dead_reckoned(values, own, stretch, method) - stretch.speed)
 
-    ones = jnp.ones(len(names))
+    ones = jnp.ones_like(mean)
     fit = fit_shared(residual, weighted, 0 * ones, ones, own0, jnp.asarray(_OWN_STD), start=(x0, own0))
     return fit.shared, fit.covariance, (fit.residuals * noise[0],)
 
 
 def _dead_reckoned(values: dict[str, jax.Array], own: jax.Array, stretch: _Stretches, method: str) -> jax.Array:
-    def triad(kind: str, nominal: float) -> jax.Array:
-        return jnp.stack([jnp.asarray(values.get(f"{kind}_{axis}", nominal)) for axis in "xyz"])
+    def triad(kind: str) -> jax.Array:
+        return jnp.stack([values[f"{kind}_{axis}"] for axis in "xyz"])
 
-    scale = values.get("accelerometer_scale", 1.0) * triad("accelerometer_scale", 1.0)
-    f = correct_accelerometer(Accelerometer(bias=triad("accelerometer_bias", 0.0), scale=scale), stretch.f)
-    w = correct_gyro(Gyro(bias=triad("gyro_bias", 0.0), scale=triad("gyro_scale", 1.0)), stretch.w, f)
-    angles = [jnp.asarray(values.get(name, 0.0)) for name in ("mounting_pitch", "mounting_yaw")]
+    scale = values["accelerometer_scale"] * triad("accelerometer_scale")
+    f = correct_accelerometer(Accelerometer(bias=triad("accelerometer_bias"), scale=scale), stretch.f)
+    w = correct_gyro(Gyro(bias=triad("gyro_bias"), scale=triad("gyro_scale")), stretch.w, f)
+    angles = [values[name] for name in ("mounting_pitch", "mounting_yaw")]
     mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), *angles]))
     (f_x, f_y, _), (_, w_y, w_z) = (f @ mounting.T).T, (w @ mounting.T).T
     start = own[0], own[1], stretch.gravity, _STEP
@@ -256,11 +309,10 @@ def _from_filter(
         )
         drive = replace(drive, gravity=place)
         initial = initial_state(drive, last, None, None)
-        track = run_filter(
-            drive, last, AUTO_SENSORS, initial, fit_noise(drive, last, AUTO_SENSORS, initial, NOMINAL_NOISE)
-        )
-        value = value + signs * np.asarray(track.states)[-1, rows]
-        covariance = np.asarray(track.last_covariance)[np.ix_(rows, rows)] * np.outer(signs, signs)
+        noise = fit_noise(drive, last, AUTO_SENSORS, initial, NOMINAL_NOISE)
+        found = run_filter(drive, last, AUTO_SENSORS, initial, noise).last
+        value = value + signs * found.states[rows]
+        covariance = np.asarray(found.covariance)[np.ix_(rows, rows)] * np.outer(signs, signs)
         calibration = calibration_from(
             method, names, value / unit, covariance / np.outer(unit, unit), pd.DataFrame(), prior=prior
         )
@@ -276,49 +328,61 @@ def _from_aid(
     method: str,
 ) -> tuple[Calibration, list[dict[str, str | float | bool]]]:
     """The wheels' or the receiver's speed, corrected, against the reference."""
-    delays = ["gnss_delay" if recording.wheel is None else "wheel_delay" for recording in recordings]
     data = []
-    for recording, (t, speed), delay in zip(recordings, references, delays, strict=True):
+    for recording, (t, speed) in zip(recordings, references, strict=True):
         t_aid, aid = aid_of(recording)
         t_aid = t_aid - start_of(recording)
         known = (t > t_aid[0] + _NEAR) & (t < t_aid[-1] - _NEAR)
         gap = np.diff(t_aid)[np.clip(np.searchsorted(t_aid, t) - 1, 0, t_aid.size - 2)]
         known &= gap <= _NEAR
-        data.append({"t": t[known], "speed": speed[known], "t_aid": t_aid, "aid": aid, "delay": delay})
-    fitted = [int(np.sum(part["t"] <= end)) for part, end in zip(data, ends, strict=True)]
+        data.append((t[known], speed[known], t_aid, aid))
+    fitted = [int(np.sum(t <= end)) for (t, *_), end in zip(data, ends, strict=True)]
     if min(fitted) < 3:
         raise ValueError(
             f"{', '.join(names)}: fewer than 3 speeds of aid and reference together before the end of the fit"
         )
-    known = PARAMETERS.loc[names]
-    mean, unit = (jnp.asarray(known[column].to_numpy(float)) for column in ("nominal", "uncertainty"))
-
-    def errors(values: dict, counts: Sequence[int]) -> tuple[jax.Array, ...]:
-        found = []
-        for part, n in zip(data, counts, strict=True):
-            scale = values.get("wheel_scale", 1.0) if part["delay"] == "wheel_delay" else 1.0
-            at = jnp.asarray(part["t"][:n]) + values.get(part["delay"], 0.0)
-            speed = scale * jnp.interp(at, jnp.asarray(part["t_aid"]), jnp.asarray(part["aid"]))
-            found.append((speed - part["speed"][:n])[None])
-        return tuple(found)
-
-    def residuals(x: jax.Array) -> tuple[jax.Array, ...]:
-        return errors(dict(zip(names, mean + unit * x, strict=True)), fitted)
-
-    fit = fit_to_reference(
-        jax.jit(lambda x, noise: weighted_fit(residuals, x, noise)), len(names), residuals(jnp.zeros(len(names)))
+    size, size_aid = (bucket(max(part[k].size for part in data), _SPEEDS) for k in (0, 2))
+    t, speed = (np.stack([padded(part[k], size) for part in data]) for k in (0, 1))
+    t_aid, aid = (np.stack([padded(part[k], size_aid) for part in data]) for k in (2, 3))
+    by_wheel = np.array([recording.wheel is not None for recording in recordings])
+    counts, counts_fitted = (
+        (np.arange(size) < np.array(numbers)[:, None]).astype(float)
+        for numbers in ([part[0].size for part in data], fitted)
     )
+    aids = _Aids(by_wheel=by_wheel, t=t, speed=speed, weight=counts, t_aid=t_aid, aid=aid)
+    before = replace(aids, weight=counts_fitted)
+    mean, unit = _priors(_OF_THE_AID, names)
+
+    def solve(x: np.ndarray, noise: np.ndarray) -> Found:
+        return _solve_aid(x, noise, before, mean, unit)
+
+    first = list(np.asarray(_aid_errors(mean, before))[:, None])
+    fit = fit_to_reference(_of_some(_OF_THE_AID, names, solve), len(names), first)
     calibration = calibration_from(method, names, fit.x, fit.covariance, pd.DataFrame())
-    whole = [part["t"].size for part in data]
+    values = np.array([calibration.values.get(name, nominal) for name, nominal in zip(_OF_THE_AID, mean, strict=True)])
     rows = []
-    for recording, part, n, *pair in zip(
-        recordings, data, fitted, errors({}, whole), errors(dict(calibration.values), whole), strict=True
+    for recording, (t, *_), n, nominal, best in zip(
+        recordings, data, fitted, *(np.asarray(_aid_errors(x, aids)) for x in (mean, values)), strict=True
     ):
-        nominal, best = (np.asarray(error)[0] for error in pair)
-        interval = np.array([part["t"][0], part["t"][n - 1], part["t"][-1]]) + start_of(recording)
-        halves = [[_rms(error[cut]) for error in (nominal, best)] for cut in (slice(0, n), slice(n, None))]
+        interval = np.array([t[0], t[n - 1], t[-1]]) + start_of(recording)
+        halves = [[_rms(error[cut]) for error in (nominal, best)] for cut in (slice(0, n), slice(n, t.size))]
         rows.append(held_out_row(recording.name, "speed of the aid", "m/s", interval.tolist(), *halves))
     return calibration, rows
+
+
+@jax.jit
+def _aid_errors(values: jax.Array, aids: _Aids) -> jax.Array:
+    """Speed of the aid, corrected by the values of `_OF_THE_AID`, less that of the reference, by recording."""
+    scale, wheel_delay, gnss_delay = values
+    at = aids.t + jnp.where(aids.by_wheel, wheel_delay, gnss_delay)[:, None]
+    speed = jnp.where(aids.by_wheel, scale, 1.0)[:, None] * jax.vmap(jnp.interp)(at, aids.t_aid, aids.aid)
+    return jnp.asarray(aids.weight) * (speed - aids.speed)
+
+
+@jax.jit
+def _solve_aid(x0: jax.Array, noise: jax.Array, aids: _Aids, mean: jax.Array, unit: jax.Array) -> Found:
+    """The constants in units of their priors."""
+    return weighted_fit(lambda x: tuple(_aid_errors(mean + unit * x, aids)[:, None]), x0, noise)
 
 
 def _outages(
@@ -333,18 +397,18 @@ def _outages(
         drive = drive_in_steps(recording, known, np.inf)
         if not starts.size or not np.any(drive.t_aid <= 1.0):
             return []  # without an aid at the start the verb wants an initial speed
-        for start in starts:
+        run = None
+        for start in tracked(starts.tolist(), f"outages of {recording.name}, {kind} constants"):
             initial = initial_state(drive, start, None, None)
-            track = run_filter(drive, start, AUTO_SENSORS, initial, NOMINAL_NOISE)
-            # Outages of one length are compiled once.
-            samples = drive.t <= start + OUTAGE
-            outage = replace(drive, t=drive.t[samples], f_b=drive.f_b[samples], w_b=drive.w_b[samples])
-            estimate = on_imu(outage, track, AUTO_SENSORS)
+            samples = np.searchsorted(drive.t, start + OUTAGE, side="right")
+            outage = replace(drive, t=drive.t[:samples], f_b=drive.f_b[:samples], w_b=drive.w_b[:samples])
+            run = run_filter(drive, start, AUTO_SENSORS, initial, NOMINAL_NOISE, start + OUTAGE, run)
+            estimate = on_imu(outage, run, samples_between(outage, start, start + OUTAGE))
             if method != "filter":
-                dead_reckon(estimate, outage, track, start, AUTO_SENSORS, method, NOMINAL_NOISE)
+                dead_reckon(estimate, outage, run, start, method)
             times = start + np.arange(0.5, OUTAGE + 0.1, 0.5)
             truth, near = _at(reference, times)
-            errors[kind, start] = (np.interp(times, outage.t, estimate["speed"]) - truth)[near]
+            errors[kind, start] = (np.interp(times, estimate.index, estimate["speed"]) - truth)[near]
     halves = [
         [_rms(np.concatenate([errors[kind, start] for start in chosen] or [[]])) for kind in ("nominal", "fitted")]
         for chosen in (starts[starts + OUTAGE <= end], starts[starts >= end])

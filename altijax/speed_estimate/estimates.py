@@ -5,22 +5,27 @@ are theirs, so that only what happens afterwards differs. An estimate never look
 an aid that comes after `aid_until`.
 """
 
-from dataclasses import fields, replace
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
+from jax.typing import ArrayLike
 from scipy.optimize import minimize
 
 from altijax.calibration.records import Calibration
 from altijax.drives import imu_of, start_of
+from altijax.padding import bucket, padded
 from altijax.recordings import Recording
+from altijax.series import interpolated
 from altijax.speed import speed_error_growth, speed_with_aided_roll, speed_with_roll, speed_without_roll
-from altijax.speed_estimate.filter import SpeedTrack, filter_speed
+from altijax.speed_estimate.filter import MARGIN, SpeedState, filter_speed, first_state
 from altijax.speed_estimate.model import SENSORS, SpeedNoise, state_names
 from altijax.speed_estimate.steps import STEP, SpeedDrive, drive_in_steps, initial_state, steps_until
+from altijax.stages import stages
 
 SPEED_METHODS = ("conventional", "roll", "aided", "filter")
 
@@ -39,6 +44,12 @@ _ALSO_FITTED = ("vibration", "roughness", "roughness_scatter", "aid", "accelerom
 _DIFFERENCE = 1e-5
 # By what factor, as a logarithm, a car's noise levels differ from the nominal ones.
 _NOISE_SPREAD = 1.0
+# Steps that are filtered at a time, a multiple of `MARGIN`: long against a margin and short against an outage.
+_PART = 100
+# Of a `SpeedTrack`, what is kept of a run.
+_TRACKED = ("speed", "speed_std", "pitch", "roll", "states", "states_std")
+# Samples that dead reckoning is filled up to: some minutes.
+_SAMPLES = 16384
 NOMINAL_NOISE: dict[str, float] = {field.name: float(getattr(SpeedNoise(), field.name)) for field in fields(SpeedNoise)}
 """Levels of `SpeedNoise` before anything is known of a drive."""
 
@@ -87,18 +98,21 @@ def estimate_speed(
         If an option is unknown or the recording lacks what it needs.
     """
     require_options(method, sensors)
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), stages(f"speed of {recording.name}") as stage:
         until = 1.0 if aid_until is None else aid_until - start_of(recording)
+        stage("readings in steps")
         drive = drive_in_steps(recording, calibration, until)
         sensors = AUTO_SENSORS if sensors == "auto" else sensors
         initial = initial_state(drive, until, initial_speed, initial_pitch)
+        stage("noise levels")
         noise = fit_noise(drive, until, sensors, initial, NOMINAL_NOISE)
-        track = run_filter(drive, until, sensors, initial, noise)
-        estimate = on_imu(drive, track, sensors)
+        stage("filter")
+        run = run_filter(drive, until, sensors, initial, noise)
+        estimate = on_imu(drive, run)
         if method != "filter":
-            dead_reckon(estimate, drive, track, until, sensors, method, noise)
-        usual = float(np.median(np.diff(drive.t)))
-        gap = np.diff(drive.t, prepend=drive.t[0]) > max(5 * usual, 0.1)
+            stage("dead reckoning")
+            dead_reckon(estimate, drive, run, until, method)
+        gap = np.diff(drive.t, prepend=drive.t[0]) > max(5 * drive.usual, 0.1)
         estimate["valid"] &= ~gap
         estimate.index = imu_of(recording).index
     return estimate
@@ -111,6 +125,30 @@ def require_options(method: str, sensors: str) -> None:
         raise ValueError(f"sensors must be one of auto, {', '.join(SENSORS)}, got {sensors!r}")
 
 
+@dataclass(frozen=True, kw_only=True)
+class FilterRun:
+    """The filter over a drive, as far as it was asked for, in parts that a later run may share."""
+
+    sensors: str
+    initial: tuple[float, float]
+    noise: dict[str, float]
+    inputs: dict[str, np.ndarray]
+    starts: tuple[SpeedState, ...]
+    """What a bank of filters knew before each part, and after the last one."""
+    parts: tuple[dict[str, np.ndarray], ...]
+    """What the first of them found in each part: fields of `SpeedTrack`."""
+
+    def track(self, step: int = 0) -> tuple[int, dict[str, np.ndarray]]:
+        """First step of the part in which a step lies, and what was found from there on."""
+        parts = self.parts[step // _PART :]
+        return step // _PART * _PART, {name: np.concatenate([part[name] for part in parts]) for name in _TRACKED}
+
+    @property
+    def last(self) -> SpeedState:
+        """What was known at the end."""
+        return jax.tree.map(lambda x: np.asarray(x)[0], self.starts[-1])
+
+
 def fit_noise(
     drive: SpeedDrive, until: float, sensors: str, initial: tuple[float, float], start: dict[str, float]
 ) -> dict[str, float]:
@@ -120,14 +158,21 @@ def fit_noise(
     names = _FITTED[sensors] + _ALSO_FITTED
     nominal = np.log([NOMINAL_NOISE[name] for name in names])
     inputs = steps_until(drive, until)
-    counted = (drive.ends <= until).astype(float)
+    parts = list(_parts(inputs, int(np.sum(drive.ends <= until))))
+    first = _before_the_first(drive, initial, sensors)
+    # By differences, all at once: the filter's derivatives take five times as long.
+    shifts = np.concatenate([np.zeros((1, len(names))), _DIFFERENCE * np.eye(len(names))])
 
     def objective(logarithms: np.ndarray) -> tuple[float, np.ndarray]:
-        value, slope = _misfit(logarithms, inputs, counted, initial, drive.gravity, sensors, names)
+        noise = _bank(sensors, NOMINAL_NOISE | dict(zip(names, np.exp(logarithms + shifts).T, strict=True)))
+        state, misfits = first, np.zeros(len(shifts))
+        for inputs, counted in parts:
+            state, log_likelihoods, _ = _go_on(state, inputs, counted, np.float64(drive.gravity), noise, sensors)
+            misfits -= np.asarray(log_likelihoods)
         from_nominal = (logarithms - nominal) / _NOISE_SPREAD
         return (
-            float(value) + 0.5 * float(from_nominal @ from_nominal),
-            np.asarray(slope) + from_nominal / _NOISE_SPREAD,
+            float(misfits[0]) + 0.5 * float(from_nominal @ from_nominal),
+            (misfits[1:] - misfits[0]) / _DIFFERENCE + from_nominal / _NOISE_SPREAD,
         )
 
     found = minimize(
@@ -140,108 +185,175 @@ def fit_noise(
     return NOMINAL_NOISE | dict(zip(names, np.exp(found.x).tolist(), strict=True))
 
 
-@partial(jax.jit, static_argnames=("sensors", "names"))
-def _misfit(
-    logarithms: jax.Array,
-    inputs: dict[str, jax.Array],
-    counted: jax.Array,
-    initial: tuple[float, float],
-    gravity: float,
-    sensors: str,
-    names: tuple[str, ...],
-) -> tuple[jax.Array, jax.Array]:
-    """Minus the log-likelihood and its gradient, by differences: the filter's derivatives take five times as long."""
-
-    def misfit(logarithms: jax.Array) -> jax.Array:
-        noise = replace(SpeedNoise(), **dict(zip(names, jnp.exp(logarithms), strict=True)))
-        return -jnp.sum(counted * _run(inputs, initial, gravity, noise, sensors).log_likelihood)
-
-    shifts = jnp.concatenate([jnp.zeros((1, len(names))), _DIFFERENCE * jnp.eye(len(names))])
-    misfits = jax.vmap(misfit)(logarithms + shifts)
-    return misfits[0], (misfits[1:] - misfits[0]) / _DIFFERENCE
-
-
 def run_filter(
-    drive: SpeedDrive, until: float, sensors: str, initial: tuple[float, float], noise: dict[str, float]
-) -> SpeedTrack:
-    return _run(steps_until(drive, until), initial, drive.gravity, SpeedNoise(**noise), sensors)
+    drive: SpeedDrive,
+    until: float,
+    sensors: str,
+    initial: tuple[float, float],
+    noise: dict[str, float],
+    end: float = np.inf,
+    before: FilterRun | None = None,
+) -> FilterRun:
+    """The filter with the aid up to `until`, on to `end` or further; what a run before shares is not run again."""
+    inputs = steps_until(drive, until)
+    count = drive.ends.size
+    if before is not None and (before.sensors, before.initial, before.noise) == (sensors, initial, noise):
+        starts, parts = list(before.starts), list(before.parts)
+        same = min((_same_steps(before.inputs[name], values) for name, values in inputs.items()), default=count)
+        shared = len(parts) if same == count else max(same - MARGIN, 0) // _PART
+        del starts[shared + 1 :], parts[shared:]
+    else:
+        starts, parts = [_before_the_first(drive, initial, sensors)], []
+    levels = _bank(sensors, noise)
+    wanted = min(int(np.searchsorted(drive.ends, end)) + 1, count)
+    for part, counted in _parts(inputs, count, len(parts), wanted):
+        state, _, track = _go_on(starts[-1], part, counted, np.float64(drive.gravity), levels, sensors)
+        starts.append(state)
+        parts.append({name: np.asarray(values)[counted] for name, values in track.items()})
+    return FilterRun(
+        sensors=sensors, initial=initial, noise=noise, inputs=inputs, starts=tuple(starts), parts=tuple(parts)
+    )
+
+
+def _same_steps(a: np.ndarray, b: np.ndarray) -> int:
+    """How many steps from the first one on are the same in both."""
+    if a is b:
+        return len(a)
+    differs = a != b
+    return int(np.argmax(differs)) if differs.any() else len(a)
+
+
+def _parts(
+    inputs: dict[str, np.ndarray], count: int, first: int = 0, wanted: int | None = None
+) -> Iterator[tuple[dict[str, np.ndarray], np.ndarray]]:
+    """Parts of the first `count` steps with their margins, from the first wanted on, and which steps count in each."""
+    for begin in range(first * _PART, count if wanted is None else wanted, _PART):
+        steps = np.arange(begin - MARGIN, begin + _PART + MARGIN)
+        counted = (steps >= begin) & (steps < min(begin + _PART, count))
+        steps = np.clip(steps, 0, len(inputs["f_b"]) - 1)
+        yield {name: values[steps] for name, values in inputs.items()}, counted
+
+
+def _bank_size(sensors: str) -> int:
+    """As many filters as a fit of the noise levels runs at once: all runs share one program."""
+    return 1 + len(_FITTED[sensors] + _ALSO_FITTED)
+
+
+def _bank(sensors: str, noise: Mapping[str, float | np.ndarray]) -> SpeedNoise:
+    return SpeedNoise(**{name: np.broadcast_to(level, _bank_size(sensors)) for name, level in noise.items()})
+
+
+def _before_the_first(drive: SpeedDrive, initial: tuple[float, float], sensors: str) -> SpeedState:
+    """The same for all filters of a bank."""
+    first = first_state(
+        *(drive.f_steps[0], drive.w_steps[0], *map(np.float64, (*initial, drive.gravity))),
+        sensors=sensors,
+        states_std=drive.states_std,
+    )
+    return jax.tree.map(lambda x: np.stack([np.asarray(x)] * _bank_size(sensors)), first)
 
 
 @partial(jax.jit, static_argnames="sensors")
-def _run(
-    inputs: dict[str, jax.Array], initial: tuple[float, float], gravity: float, noise: SpeedNoise, sensors: str
-) -> SpeedTrack:
-    speed0, pitch0 = initial
-    return filter_speed(**inputs, speed0=speed0, pitch0=pitch0, gravity=gravity, dt=STEP, noise=noise, sensors=sensors)
-
-
-def on_imu(drive: SpeedDrive, track: SpeedTrack, sensors: str) -> pd.DataFrame:
-    columns = {name: np.asarray(getattr(track, name)) for name in ("speed", "speed_std", "pitch", "roll")}
-    estimate = pd.DataFrame({name: np.interp(drive.t, drive.ends, x) for name, x in columns.items()})
-    return estimate.assign(valid=True)
-
-
-def dead_reckon(
-    estimate: pd.DataFrame,
-    drive: SpeedDrive,
-    track: SpeedTrack,
-    until: float,
+def _go_on(
+    start: SpeedState,
+    inputs: dict[str, jax.Array],
+    counted: jax.Array,
+    gravity: jax.Array,
+    noise: SpeedNoise,
     sensors: str,
-    method: str,
-    noise: dict[str, float],
-) -> None:
+) -> tuple[SpeedState, jax.Array, dict[str, jax.Array]]:
+    """A part of the drive through a bank of filters: their last states, log-likelihoods, and the first one's track."""
+
+    def one(start: SpeedState, noise: SpeedNoise) -> tuple[tuple[SpeedState, jax.Array], dict[str, jax.Array]]:
+        track = filter_speed(
+            **inputs,
+            speed0=0.0,
+            pitch0=0.0,
+            gravity=gravity,
+            dt=STEP,
+            noise=noise,
+            sensors=sensors,
+            counted=counted,
+            start=start,
+        )
+        end = SpeedState(states=track.states[-1], covariance=track.last_covariance)
+        return (end, jnp.sum(track.log_likelihood)), {name: getattr(track, name) for name in _TRACKED}
+
+    # the bank after the time: as the scan has it
+    (end, log_likelihoods), track = jax.vmap(one, out_axes=(0, 1))(start, noise)
+    return end, log_likelihoods, {name: values[:, 0] for name, values in track.items()}
+
+
+def samples_between(drive: SpeedDrive, begin: float, end: float) -> slice:
+    """Samples of the IMU from the last one up to a time on to the first one from another on."""
+    first, last = np.searchsorted(drive.t, begin, side="right") - 1, np.searchsorted(drive.t, end)
+    return slice(max(int(first), 0), min(int(last) + 1, drive.t.size))
+
+
+def on_imu(drive: SpeedDrive, run: FilterRun, rows: slice = slice(None)) -> pd.DataFrame:
+    """An estimate at samples of the IMU, indexed by their times from the first one."""
+    t = drive.t[rows]
+    begin, track = run.track(max(int(t[0] / STEP) - 1, 0))
+    ends = drive.ends[begin : begin + len(track["speed"])]
+    columns = {name: np.interp(t, ends, track[name]) for name in ("speed", "speed_std", "pitch", "roll")}
+    return pd.DataFrame(columns, index=t).assign(valid=True)
+
+
+def dead_reckon(estimate: pd.DataFrame, drive: SpeedDrive, run: FilterRun, until: float, method: str) -> None:
     """Write over the rows after the aid what a method without a filter makes of the same constants."""
     last = int(np.clip(np.searchsorted(drive.ends, until, side="right") - 1, 0, drive.ends.size - 1))
-    names = state_names(sensors)
-    state = dict(zip(names, np.asarray(track.states[last]), strict=True))
-    std = dict(zip(names, np.asarray(track.states_std[last]), strict=True))
     begin, end = drive.ends[last], drive.t[-1]
-    count = round((end - begin) / float(np.median(np.diff(drive.t)))) + 1
-    if count < 2:
+    intervals = round((end - begin) / drive.usual)
+    if intervals < 1:
         return
-    t = np.linspace(begin, end, count)
-    dt = t[1] - t[0]
-    f, w = (np.stack([np.interp(t, drive.t, x) for x in series.T], -1) for series in (drive.f_b, drive.w_b))
+    dt = (end - begin) / intervals
+    # no further than there are rows
+    count = min(intervals, int(np.ceil((estimate.index[-1] - begin) / dt))) + 1
+    t = begin + dt * np.arange(count)
+    first, track = run.track(last)
+    names = state_names(run.sensors)
+    state = dict(zip(names, track["states"][last - first], strict=True))
+    std = dict(zip(names, track["states_std"][last - first], strict=True))
+    f, w = (interpolated(t, drive.t, series) for series in (drive.f_b, drive.w_b))
     f_x, f_y = f[:, 0] - state["accelerometer_bias_x"], f[:, 1] - state["accelerometer_bias_y"]
     w_y = w[:, 1] - state["gyro_bias_y"] - state["rectification_y"] * np.interp(t, drive.ends, drive.vibration)
     w_z = w[:, 2] - state["gyro_bias_z"]
     # along and across the direction of travel
     along, across = np.cos(state["travel_yaw"]), np.sin(state["travel_yaw"])
     f_x, f_y = along * f_x + across * f_y, along * f_y - across * f_x
-    pitch, roll = float(track.pitch[last]), float(track.roll[last])
-    pitch0 = float(np.arcsin(np.clip(along * np.sin(pitch) + across * np.cos(pitch) * np.sin(roll), -1, 1)))
-    speed0 = float(track.speed[last])
-    valid = np.ones(count, bool)
-    rolls = np.zeros(count)
+    pitch, roll = track["pitch"][last - first], track["roll"][last - first]
+    pitch0 = np.arcsin(np.clip(along * np.sin(pitch) + across * np.cos(pitch) * np.sin(roll), -1, 1))
+    speed0 = track["speed"][last - first]
+    size = bucket(count, _SAMPLES)
+    filled = [padded(x, size) for x in (f_x, f_y, w_y, w_z)]
+    start = speed0, pitch0, np.float64(drive.gravity), dt
+    # roll and where one explains the readings, if the method asks for it
+    rest: tuple[ArrayLike, ArrayLike] = np.zeros(size), np.ones(size, bool)
+    growth, response = np.ones(count), t - begin
     if method == "conventional":
-        speed, pitches = speed_without_roll(f_x, w_y, speed0, pitch0, drive.gravity, dt)
-        growth, response = np.ones(count), t - begin
+        speed, pitches = speed_without_roll(filled[0], filled[2], *start)
     elif method == "roll":
-        speed, pitches, rolls, valid = speed_with_roll(f_x, f_y, w_y, w_z, speed0, pitch0, drive.gravity, dt)
-        growth, response = (np.asarray(x) for x in speed_error_growth(w_z, dt))
+        speed, pitches, *rest = speed_with_roll(*filled, *start)
+        growth, response = (np.asarray(x)[:count] for x in speed_error_growth(filled[3], dt))
     else:
-        held = np.full(count, speed0)
-        speed, pitches, rolls, valid = speed_with_aided_roll(
-            f_x, f_y, w_y, w_z, held, np.ones(count), speed0, pitch0, drive.gravity, dt
-        )
-        growth, response = np.ones(count), t - begin
+        speed, pitches, *rest = speed_with_aided_roll(*filled, np.full(size, speed0), np.ones(size), *start)
+    found = {"speed": speed, "pitch": pitches, "roll": rest[0], "valid": rest[1]}
+    found = {name: np.asarray(values)[:count] for name, values in found.items()}
     g, span = drive.gravity, t - begin
     acceleration = g * std["pitch"]
     turned = np.cumsum(np.abs(w_z)) * dt
-    roll_error = noise["road_roll"]
     variance = (
         (growth * std["speed"]) ** 2
         + (response * acceleration) ** 2
         + (g * std["gyro_bias_y"] * response * span / 2) ** 2
-        + noise["acceleration"] ** 2 * span
-        + (g * noise["rotation"]) ** 2 * response**2 * span / 3
-        + (g * roll_error * turned * response / 2) ** 2
+        + run.noise["acceleration"] ** 2 * span
+        + (g * run.noise["rotation"]) ** 2 * response**2 * span / 3
+        + (g * run.noise["road_roll"] * turned * response / 2) ** 2
     )
-    rows = drive.t > begin
-    columns = {"speed": np.maximum(np.asarray(speed), 0), "speed_std": np.sqrt(variance)}
-    columns |= {"pitch": np.asarray(pitches), "roll": np.asarray(rolls)}
+    later = estimate.index > begin
+    times = estimate.index[later].to_numpy()
+    columns = {"speed": np.maximum(found["speed"], 0), "speed_std": np.sqrt(variance)}
+    columns |= {"pitch": found["pitch"], "roll": found["roll"]}
     for name, values in columns.items():
-        estimate.loc[rows, name] = np.interp(drive.t[rows], t, values)
-    estimate.loc[rows, "valid"] = np.asarray(valid)[
-        np.clip(np.rint((drive.t[rows] - begin) / dt), 0, count - 1).astype(int)
-    ]
+        estimate.loc[later, name] = np.interp(times, t, values)
+    estimate.loc[later, "valid"] = found["valid"][np.clip(np.rint((times - begin) / dt), 0, count - 1).astype(int)]

@@ -5,7 +5,10 @@ on themselves, here it is a noisy measurement of a speed and a roll that both ha
 tells the speed. The constants of the sensors and of their mounting are states, learned for as long as a speed is given.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from itertools import pairwise
 
 import jax
 import jax.numpy as jnp
@@ -34,6 +37,9 @@ _SLOW = 11
 # Steps that a bump shakes a car for: the mean over as many is one measurement, else one bump counts as several. Seen on
 # two cars and a motorbike: the logarithm's correlation is 0.4 to 0.7 after one step, at most 0.23 after five.
 _BUMP = 5
+MARGIN = -(-(_SLOW // 2) // _BUMP) * _BUMP
+"""Steps before and after it that a part of a drive needs, uncounted, to be filtered like the whole; it may begin at a
+multiple of as many."""
 
 
 @jax.tree_util.register_dataclass
@@ -71,6 +77,78 @@ class SpeedTrack:
     last_covariance: jax.Array
 
 
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class SpeedState:
+    """What is known between two steps.
+
+    Attributes
+    ----------
+    states : (states,)
+        All states, named by `state_names`.
+    covariance : (states, states)
+        Their covariance.
+    """
+
+    states: jax.Array
+    covariance: jax.Array
+
+
+@partial(jax.jit, static_argnames="sensors")
+def first_state(
+    f_b: ArrayLike,
+    w_b: ArrayLike,
+    speed0: ArrayLike,
+    pitch0: ArrayLike,
+    gravity: ArrayLike,
+    sensors: str = "2+2",
+    states_std: ArrayLike | None = None,
+) -> SpeedState:
+    """What `filter_speed` knows before the first step.
+
+    Parameters
+    ----------
+    f_b : (3,) m/s^2
+        Mean specific force in the first step.
+    w_b : (3,) rad/s
+        Mean angular rate in it.
+    speed0 : () m/s
+        Speed at the start.
+    pitch0 : () rad
+        Pitch at the start.
+    gravity : () m/s^2
+        Magnitude of gravity.
+    sensors : {"2+2", "2+3", "6"}, optional
+        Accelerometers + gyros to use.
+    states_std : array, optional
+        Standard deviation of each of `STATES`; their own values by default.
+
+    Returns
+    -------
+    state : SpeedState
+        The roll from the lateral force, and all constants zero.
+
+    Raises
+    ------
+    ValueError
+        If the shapes do not fit or `sensors` is unknown.
+    """
+    names = state_names(sensors)
+    f_b = require_shape("f_b", f_b, (3,))
+    w_b = require_shape("w_b", w_b, (3,))
+    scalars = {"speed0": speed0, "pitch0": pitch0, "gravity": gravity}
+    speed0, pitch0, gravity = (require_shape(name, value, ()).astype(f_b.dtype) for name, value in scalars.items())
+    roll0 = jnp.clip((f_b[1] - speed0 * w_b[2]) / gravity, -0.5, 0.5)
+    known = {"speed": speed0, "pitch": pitch0, "roll": roll0, "resting_roll": roll0}
+    all_std = jnp.asarray(list(STATES.values()) if states_std is None else states_std, f_b.dtype)
+    all_std = require_shape("states_std", all_std, (len(STATES),))
+    return SpeedState(
+        states=jnp.stack([known.get(name, jnp.zeros_like(speed0)) for name in names]),
+        covariance=jnp.diag(all_std[jnp.asarray([list(STATES).index(name) for name in names])] ** 2),
+    )
+
+
+@partial(jax.jit, static_argnames="sensors")
 def filter_speed(
     f_b: ArrayLike,
     w_b: ArrayLike,
@@ -87,6 +165,8 @@ def filter_speed(
     noise: SpeedNoise | None = None,
     sensors: str = "2+2",
     states_std: ArrayLike | None = None,
+    counted: ArrayLike | None = None,
+    start: SpeedState | None = None,
 ) -> SpeedTrack:
     """Speed by an extended Kalman filter over the constants of the sensors and their mounting.
 
@@ -132,6 +212,12 @@ def filter_speed(
     states_std : array, optional
         Standard deviation of each of `STATES` before the first sample, in their order, used or not: that of a
         calibration, say. Their own values by default.
+    counted : (time,), optional
+        Not zero where a step counts, by default everywhere; elsewhere the states are held and the speed is zero. So
+        arrays may be filled up with copies of their first and last steps.
+    start : SpeedState, optional
+        What is known before the first step that counts: the last states and covariance of an earlier part of the drive.
+        By default `first_state`, which alone asks for `speed0`, `pitch0` and `states_std`.
 
     Returns
     -------
@@ -179,71 +265,89 @@ def filter_speed(
     )
     index = {name: number for number, name in enumerate(names)}
     gain = index["vibration_gain"]
+    moved = jnp.asarray([index[name] for name in ("speed", "lateral_speed", "vertical_speed") if name in index])
+    largest = jnp.asarray([_LARGEST.get(name, _UNLIKELY * STATES[name]) for name in names], dtype)
+    identity = jnp.eye(len(names), dtype=dtype)
     rates, observe, travel_speed = model_of(sensors)
 
     def named(x: jax.Array) -> dict[str, jax.Array]:
         return dict(zip(names, x, strict=True))
 
-    def slope(x: jax.Array, step: Step) -> jax.Array:
-        found = rates(named(x), step, gravity, noise)
-        return jnp.stack([found.get(name, jnp.zeros((), dtype)) for name in names])
+    def stage(x: jax.Array, step: Step, at: jax.Array, one: tuple[jax.Array, jax.Array]) -> tuple:
+        """Rates at a place and their derivatives, and the next place."""
+        further, w_b = one
 
-    def advance(x: jax.Array, step: Step) -> jax.Array:
-        return x + dt * slope(x + dt / 2 * slope(x, step), step)
+        def slope(at: jax.Array, w_b: jax.Array) -> jax.Array:
+            found = rates(named(at), step._replace(w_b=w_b), gravity, noise)
+            return jnp.stack([found.get(name, jnp.zeros((), dtype)) for name in names])
 
-    def expected(x: jax.Array, step: Step) -> jax.Array:
-        middle = x - dt / 2 * slope(x, step)
-        return jnp.stack(observe(named(x), named(middle), rates(named(x), step, gravity, noise), step, gravity))
+        rate, derivatives = _linearised(slope, at, w_b)
+        return x + further * rate, (at, rate, *derivatives)
 
-    def proceed(carry: tuple[jax.Array, jax.Array], step: Step) -> tuple:
-        x, P = carry
-        # The noise of the gyros times the speed drives the velocities: gains that knew it would pull the speed down.
-        steady = step._replace(w_b=step.w_slow, w_end=step.w_slow) if sensors == "6" else step
-        F = jax.jacfwd(advance)(x, steady)
-        G = jax.jacfwd(lambda w_b: slope(x, step._replace(w_b=w_b)))(step.w_b)
+    def proceed(x: jax.Array, P: jax.Array, step: Step) -> tuple:
+        # The midpoint rule, and the rates at the place that it leads to. A loop, for compiling the model takes longest.
+        stages = [(0.5, step.w_b), (1.0, step.w_b), (0.0, step.w_b)]
+        if sensors == "6":
+            # The noise of the gyros times the speed drives the velocities: gains that knew it would pull the speed
+            # down. So the derivatives are those at steady rates, and the place goes back to x between.
+            stages = [(0.5, step.w_slow), (0.0, step.w_slow), *stages]
+        further, readings = (jnp.stack(column) for column in zip(*stages, strict=True))
+        found: tuple[jax.Array, ...] = jax.lax.scan(partial(stage, x, step), x, (dt * further, readings))[1]
+        at, rate, by_x, by_w = found
+        F = identity + dt * by_x[1] @ (identity + dt / 2 * by_x[0])
+        G = by_w[-3]
         walk = walks(named(x), step, noise, sensors)
         gyros = noise.rotation**2 + noise.vibration**2 * step.vibration
-        x, P = advance(x, step), F @ P @ F.T + dt * (jnp.diag(walk) + gyros * G @ G.T)
+        x, P = at[-1], F @ P @ F.T + dt * (jnp.diag(walk) + gyros * G @ G.T)
         # learned while aided, and of use only where that has shown that the car shakes the more the faster it is
         shaken = x[gain] > _SIGNIFICANT * _safe.sqrt(P[gain, gain])
-        linearised_at, y0, H = x, expected(x, step), jax.jacfwd(expected)(x, step)
-        measured = [jnp.stack(column) for column in zip(*measurements(step, noise, sensors, shaken), strict=True)]
+        predicted = x
+
+        def expected(x: jax.Array, middle: jax.Array, rate: jax.Array) -> jax.Array:
+            return jnp.stack(observe(named(x), named(middle), named(rate), step, gravity))
+
+        y0, along = jax.linearize(expected, x, x - dt / 2 * rate[-1], rate[-1])
+        H = jax.vmap(along, in_axes=-1, out_axes=-1)(identity, identity - dt / 2 * by_x[-1], by_x[-1])
+        value, std, valid = _columns(measurements(step, noise, sensors, shaken))
+        # The same for all noise levels, and so a branch for a batch of them: most steps have one or two measurements.
+        possible = _columns(measurements(step, noise, sensors, jnp.asarray(True)))[2]
 
         def measure(carry: tuple[jax.Array, jax.Array], one: tuple[jax.Array, ...]) -> tuple:
-            x, P = carry
-            h, y0, value, std, valid = one
-            x, P, log_likelihood = _update(x, P, h, value - y0 - h @ (x - linearised_at), std, valid)
+            possible, h, y0, value, std, valid = one
+
+            def update(x: jax.Array, P: jax.Array) -> tuple[jax.Array, jax.Array, jax.Array]:
+                return _update(x, P, h, value - y0 - h @ (x - predicted), std, valid)
+
+            x, P, log_likelihood = jax.lax.cond(possible, update, lambda x, P: (x, P, jnp.zeros((), dtype)), *carry)
             return (x, P), log_likelihood
 
         log_likelihood: jax.Array
-        (x, P), log_likelihood = jax.lax.scan(measure, (x, P), (H, y0, *measured))
+        (x, P), log_likelihood = jax.lax.scan(measure, (x, P), (possible, H, y0, value, std, valid))
         x, P = jnp.clip(x, -largest, largest), _bounded(P, largest)
-        backward = jnp.minimum(travel_speed(named(x), step), 0)
-        direction = jax.grad(lambda x: travel_speed(named(x), step))(x)
-        x = x.at[jnp.asarray(moved)].add(-backward * direction[jnp.asarray(moved)])
-        state = (
-            jnp.maximum(travel_speed(named(x), step), 0),
-            _safe.sqrt(direction @ P @ direction),
-            x[index["pitch"]],
-            total_roll(named(x), step),
-            x,
-            _safe.sqrt(jnp.diagonal(P)),
-            jnp.sum(log_likelihood),
-        )
-        return (x, P), state
+        speed, (direction,) = _linearised(lambda x: travel_speed(named(x), step), x)
+        x = x.at[moved].add(-jnp.minimum(speed, 0) * direction[moved])
+        speed = jnp.maximum(travel_speed(named(x), step), 0)
+        return x, P, speed, _safe.sqrt(direction @ P @ direction), jnp.sum(log_likelihood)
 
-    moved = [index[name] for name in ("speed", "lateral_speed", "vertical_speed") if name in index]
-    largest = jnp.asarray([_LARGEST.get(name, _UNLIKELY * STATES[name]) for name in names], dtype)
-    at_rest = {"speed": speed0, "pitch": pitch0}
-    x0 = jnp.stack([at_rest.get(name, jnp.zeros((), dtype)) for name in names])
-    roll0 = jnp.clip((f_b[0, 1] - speed0 * w_b[0, 2]) / gravity, -0.5, 0.5)
-    for name in {"roll", "resting_roll"} & set(names):
-        x0 = x0.at[index[name]].set(roll0)
-    all_std = jnp.asarray(list(STATES.values()) if states_std is None else states_std, dtype)
-    all_std = require_shape("states_std", all_std, (len(STATES),))
-    P0 = jnp.diag(all_std[jnp.asarray([list(STATES).index(name) for name in names])] ** 2)
+    def hold(x: jax.Array, P: jax.Array, step: Step) -> tuple:
+        return x, P, *3 * [jnp.zeros((), dtype)]
+
+    def body(carry: tuple[jax.Array, jax.Array], one: tuple[Step, jax.Array | None]) -> tuple:
+        step, counts = one
+        x, P, speed, speed_std, log_likelihood = (
+            proceed(*carry, step) if counts is None else jax.lax.cond(counts, proceed, hold, *carry, step)
+        )
+        seen = speed, speed_std, x[index["pitch"]], total_roll(named(x), step), x, _safe.sqrt(jnp.diagonal(P))
+        return (x, P), (*seen, log_likelihood)
+
+    if start is None:
+        start = first_state(f_b[0], w_b[0], speed0, pitch0, gravity, sensors, states_std)
+    x0 = require_shape("start.states", start.states, (len(names),)).astype(dtype)
+    P0 = require_shape("start.covariance", start.covariance, (len(names), len(names))).astype(dtype)
+    if counted is not None:
+        counted = require_shape("counted", counted, (time,)) != 0
     found: tuple[jax.Array, ...]
-    (_, P), found = jax.lax.scan(proceed, (x0, P0), steps)
+    (_, P), found = jax.lax.scan(body, (x0, P0), (steps, counted))
     return SpeedTrack(
         speed=found[0],
         speed_std=found[1],
@@ -254,6 +358,22 @@ def filter_speed(
         log_likelihood=found[6],
         last_covariance=P,
     )
+
+
+def _linearised(function: Callable[..., jax.Array], *at: jax.Array) -> tuple[jax.Array, tuple[jax.Array, ...]]:
+    """A function at a place, and its derivatives by each argument, the argument along the last axis."""
+    y, along = jax.linearize(function, *at)
+    ends = [0]
+    for x in at:
+        ends.append(ends[-1] + x.size)
+    basis = jnp.eye(ends[-1], dtype=y.dtype)
+    columns = [basis[:, first:last] for first, last in pairwise(ends)]
+    derivatives = jax.vmap(along, out_axes=-1)(*columns)
+    return y, tuple(derivatives[..., first:last] for first, last in pairwise(ends))
+
+
+def _columns(rows: list[tuple[jax.Array, ArrayLike, jax.Array]]) -> list[jax.Array]:
+    return [jnp.stack(column) for column in zip(*rows, strict=True)]
 
 
 def _bounded(P: jax.Array, largest: jax.Array) -> jax.Array:

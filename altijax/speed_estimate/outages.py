@@ -1,7 +1,7 @@
 """How a speed holds out while there is no aid: outages spread over a recording, scored against what came after."""
 
 from collections.abc import Sequence
-from itertools import pairwise
+from itertools import pairwise, product
 
 import jax
 import numpy as np
@@ -17,8 +17,10 @@ from altijax.speed_estimate.estimates import (
     on_imu,
     require_options,
     run_filter,
+    samples_between,
 )
 from altijax.speed_estimate.steps import STEP, SpeedDrive, drive_in_steps, initial_state, speed_of
+from altijax.stages import tracked
 
 # The noise levels are fitted again each time the aid has gone on for half as long again.
 _FIT_GROWTH = 1.5
@@ -120,28 +122,30 @@ def outage_errors(
         if not starts.size:
             raise ValueError(f"recording {recording.name!r} has no outage of {min(durations)} s after {first} s")
         rows = []
-        for sensors in dict.fromkeys(sensors or AUTO_SENSORS for _, _, sensors in split):
-            initial = initial_state(drive, starts[0], None, None)
-            noise, fitted_until = NOMINAL_NOISE, 0.0
-            for start in starts:
-                if start >= _FIT_GROWTH * fitted_until:
-                    noise, fitted_until = fit_noise(drive, start, sensors, initial, noise), start
-                track = run_filter(drive, start, sensors, initial, noise)
-                filtered = on_imu(drive, track, sensors)
-                for name, method, own in split:
-                    if (own or AUTO_SENSORS) != sensors:
-                        continue
-                    estimate = filtered
-                    if method != "filter":
-                        estimate = filtered.copy()
-                        dead_reckon(estimate, drive, track, start, sensors, method, noise)
-                    for duration in durations:
-                        end = start + duration
-                        if end <= last:
-                            rate = np.abs(drive.w_steps[(drive.ends > start) & (drive.ends <= end), 2])
-                            error = np.interp(end, drive.t, estimate["speed"]) - np.interp(end, t_truth, truth)
-                            std = np.interp(end, drive.t, estimate["speed_std"])
-                            rows.append((name, start + start_of(recording), duration, error, std, rate.sum() * STEP))
+        sensors_used = dict.fromkeys(sensors or AUTO_SENSORS for _, _, sensors in split)
+        for sensors, start in tracked(list(product(sensors_used, starts)), f"outages of {recording.name}"):
+            if start == starts[0]:
+                initial = initial_state(drive, start, None, None)
+                run, noise, fitted_until = None, NOMINAL_NOISE, 0.0
+            if start >= _FIT_GROWTH * fitted_until:
+                noise, fitted_until = fit_noise(drive, start, sensors, initial, noise), start
+            samples = samples_between(drive, start, min(start + max(durations), last))
+            run = run_filter(drive, start, sensors, initial, noise, drive.t[samples.stop - 1], run)
+            filtered = on_imu(drive, run, samples)
+            for name, method, own in split:
+                if (own or AUTO_SENSORS) != sensors:
+                    continue
+                estimate = filtered
+                if method != "filter":
+                    estimate = filtered.copy()
+                    dead_reckon(estimate, drive, run, start, method)
+                for duration in durations:
+                    end = start + duration
+                    if end <= last:
+                        rate = np.abs(drive.w_steps[(drive.ends > start) & (drive.ends <= end), 2])
+                        error = np.interp(end, estimate.index, estimate["speed"]) - np.interp(end, t_truth, truth)
+                        std = np.interp(end, estimate.index, estimate["speed_std"])
+                        rows.append((name, start + start_of(recording), duration, error, std, rate.sum() * STEP))
     return pd.DataFrame(rows, columns=["method", "start", "duration", "error", "std", "turning"])
 
 

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import gravity_at, imu_of, start_of
 from altijax.recordings import Recording
+from altijax.series import means_between
 from altijax.speed_estimate.model import STATES
 
 STEP = 0.2
@@ -31,6 +32,7 @@ class SpeedDrive:
     """Readings of a recording, in steps and at the IMU's own rate, times from the first IMU sample."""
 
     t: np.ndarray
+    usual: float  # time between samples
     f_b: np.ndarray
     w_b: np.ndarray
     ends: np.ndarray
@@ -63,10 +65,10 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
     mounting = Rotation.from_euler("ZY", [values.get("mounting_yaw", 0.0), -values.get("mounting_pitch", 0.0)])
     f_b, w_b = (readings @ mounting.as_matrix().T for readings in (f_b, w_b))
     edges = STEP * np.arange(int(t[-1] / STEP) + 1)
-    # the usual number of samples in half a second
-    window = max(round(_VIBRATION_WINDOW / float(np.median(np.diff(t)))), 2)
+    usual = float(np.median(np.diff(t)))
+    window = max(round(_VIBRATION_WINDOW / usual), 2)
     fast = w_b[:, 1] - uniform_filter1d(w_b[:, 1], window)
-    f_steps, w_steps, vibration = (_means(edges, t, x) for x in (f_b, w_b, (fast * fast)[:, None]))
+    f_steps, w_steps, vibration = (means_between(edges, t, x) for x in (f_b, w_b, (fast * fast)[:, None]))
     rolling = pd.DataFrame(np.hstack([f_steps, w_steps])).rolling(
         round(_STILL_WINDOW / STEP) + 1, center=True, min_periods=round(1 / STEP)
     )
@@ -76,6 +78,7 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
     gnss = recording.gnss
     return SpeedDrive(
         t=t,
+        usual=usual,
         f_b=f_b,
         w_b=w_b,
         ends=edges[1:],
@@ -98,14 +101,6 @@ def _states_std(calibration: Calibration | None, delay: str) -> np.ndarray:
     if delay in known:
         named["imu_delay"] = known[delay]
     return np.array([named.get(name, std) for name, std in STATES.items()])
-
-
-def _means(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Means between the edges of what runs straight from sample to sample."""
-    areas = 0.5 * (values[1:] + values[:-1]) * np.diff(t)[:, None]
-    integral = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(areas, 0)])
-    at_edges = np.stack([np.interp(edges, t, column) for column in integral.T], -1)
-    return np.diff(at_edges, axis=0) / np.diff(edges)[:, None]
 
 
 def aid_of(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
@@ -139,7 +134,7 @@ def initial_state(drive: SpeedDrive, until: float, speed: float | None, pitch: f
 
 
 def steps_until(drive: SpeedDrive, until: float) -> dict[str, np.ndarray]:
-    """What `filter_speed` takes, the aid after `until` left out."""
+    """Series that `filter_speed` takes, the aid after `until` left out."""
     known = (drive.t_aid >= 0) & (drive.stamp_aid <= until) & (drive.t_aid <= drive.ends[-1])
     t_aid, aid = drive.t_aid[known], drive.aid[known]
     step = np.clip(np.ceil(t_aid / STEP).astype(int) - 1, 0, drive.ends.size - 1)
@@ -164,5 +159,4 @@ def steps_until(drive: SpeedDrive, until: float) -> dict[str, np.ndarray]:
         "aid_acceleration": acceleration,
         "aid_lead": np.where(aided, mean_time - drive.ends, 0.0),
         "aided": aided,
-        "states_std": drive.states_std,
     }

@@ -7,6 +7,7 @@ import pandas as pd
 import pytest
 
 from altijax.estimates import calibrate, estimate_speed
+from altijax.programs import count_programs
 from altijax.recordings import Recording
 from altijax.speed_estimate.calibration import calibrate_speed
 from altijax.speed_estimate.steps import drive_in_steps
@@ -41,6 +42,16 @@ def test_without_an_aid_it_holds_longer() -> None:
         for known in (None, calibration)
     ]
     assert off[1] < 0.2 * off[0]
+
+
+@pytest.mark.parametrize(("method", "other"), [("conventional", "gyro_bias_y"), ("filter", "gyro_bias_z")])
+def test_other_lengths_and_constants_share_programs(method: str, other: str) -> None:
+    recording = planted(gy=0.01)
+    calibrate_speed([recording], ["gyro_bias_y"], method=method, until=40.0)
+    shorter = dataclasses.replace(recording, imu=recording.imu[:55.0])
+    with count_programs() as programs:
+        calibrate_speed([shorter], [other], method=method, until=35.0)
+    assert programs.names == []
 
 
 def test_two_drives_are_better_than_one() -> None:

@@ -9,8 +9,9 @@ import pandas as pd
 import pytest
 
 from altijax.datasets import load_dataset
+from altijax.programs import count_programs
 from altijax.recordings import Recording, RecordingWarning
-from altijax.speed_estimate.estimates import NOMINAL_NOISE, SPEED_METHODS, estimate_speed, fit_noise
+from altijax.speed_estimate.estimates import NOMINAL_NOISE, SPEED_METHODS, estimate_speed, fit_noise, run_filter
 from altijax.speed_estimate.steps import drive_in_steps, initial_state
 from tests.made_drives import curvy_recording
 
@@ -67,6 +68,28 @@ def test_noise_levels_are_those_of_the_drive(drive: Recording) -> None:
     # two readings of 0.02 m/s in each step
     assert found["aid"] == pytest.approx(0.014, rel=0.4)
     assert found["acceleration"] < 0.5 * NOMINAL_NOISE["acceleration"]
+
+
+@pytest.mark.parametrize("method", SPEED_METHODS)
+def test_recordings_of_other_lengths_share_programs(drive: Recording, method: str) -> None:
+    estimate_speed(drive, method=method, aid_until=26.0)
+    shorter = replace(drive, imu=drive.imu[:38.0])
+    with count_programs() as programs:
+        estimate_speed(shorter, method=method, aid_until=27.0)
+    assert programs.names == []
+
+
+def test_what_a_run_shares_with_one_before_is_the_same(drive: Recording) -> None:
+    with jax.enable_x64(True):
+        steps = drive_in_steps(drive, None, 40.0)
+        initial = initial_state(steps, 40.0, None, None)
+        before = run_filter(steps, 25.0, "2+3", initial, NOMINAL_NOISE, 30.0)
+        shared = run_filter(steps, 35.0, "2+3", initial, NOMINAL_NOISE, before=before)
+        alone = run_filter(steps, 35.0, "2+3", initial, NOMINAL_NOISE)
+    assert shared.parts[0] is before.parts[0] and shared.parts[1] is not before.parts[1]
+    for name, values in alone.track()[1].items():
+        np.testing.assert_array_equal(shared.track()[1][name], values)
+    np.testing.assert_array_equal(shared.last.covariance, alone.last.covariance)
 
 
 def test_wrong_options_are_named(drive: Recording) -> None:

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from altijax.speed_estimate.filter import SpeedTrack, filter_speed
+from altijax.programs import count_programs
+from altijax.speed_estimate.filter import MARGIN, SpeedState, SpeedTrack, filter_speed, first_state
 from altijax.speed_estimate.model import SENSORS, STATES, SpeedNoise, state_names
 
 GRAVITY, DT, N = 9.81, 0.2, 600
@@ -135,6 +136,36 @@ def test_what_the_aid_says_where_it_is_not_used_does_not_matter() -> None:
     made = drive() | {"aided": np.arange(N) < 200}
     garbage = np.where(made["aided"], made["aid_speed"], np.nan)
     np.testing.assert_array_equal(run(**made | {"aid_speed": garbage}).speed, run(**made).speed)
+
+
+def test_parts_filled_up_and_joined_are_the_whole() -> None:
+    """Two parts with their margins, the second one filled up to the length of the first."""
+    rng = np.random.default_rng(9)
+    made = drive(noise=0.05, seed=9) | {"vibration": rng.uniform(0, 0.01, N), "aided": np.arange(N) % 3 == 1}
+    whole = run(**made)
+    state = first_state(made["f_b"][0], made["w_b"][0], made["speed0"], made["pitch0"], GRAVITY)
+    found = []
+    for begin, end in ((0, 350), (350, N)):
+        steps = np.arange(begin - MARGIN, begin + 350 + MARGIN)
+        counted = (steps >= begin) & (steps < end)
+        part = {name: value[np.clip(steps, 0, N - 1)] if np.ndim(value) else value for name, value in made.items()}
+        track = run(**part | {"speed0": 0.0, "pitch0": 0.0}, counted=counted, start=state)
+        state = SpeedState(states=track.states[-1], covariance=track.last_covariance)
+        assert jnp.all(track.log_likelihood[~counted] == 0)
+        found.append({name: np.asarray(values)[counted] for name, values in vars(track).items() if len(values) == 360})
+    assert len(found[0]) == 7
+    for name in found[0]:
+        joined, expected = np.concatenate([part[name] for part in found]), np.asarray(getattr(whole, name))
+        np.testing.assert_allclose(joined, expected, rtol=1e-12, atol=1e-12 * np.abs(expected).max(), err_msg=name)
+    np.testing.assert_allclose(state.covariance, whole.last_covariance, rtol=1e-12, atol=1e-12)
+
+
+def test_calling_it_again_compiles_nothing() -> None:
+    made = drive()
+    filter_speed(**made)
+    with count_programs() as programs:
+        filter_speed(**made | {"speed0": np.float64(9.0)})
+    assert programs.names == []
 
 
 @pytest.mark.parametrize("sensors", ["2+2", "6"])

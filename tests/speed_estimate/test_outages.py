@@ -8,7 +8,7 @@ import pytest
 
 from altijax.recordings import Recording
 from altijax.speed_estimate import estimates as speed_estimates
-from altijax.speed_estimate.estimates import estimate_speed
+from altijax.speed_estimate.estimates import SPEED_METHODS, estimate_speed
 from altijax.speed_estimate.outages import outage_errors, outage_table
 from tests.made_drives import curvy_recording
 
@@ -41,6 +41,19 @@ def test_the_outage_table_counts_and_measures(drive: Recording) -> None:
     assert group["turning"].iloc[0] == pytest.approx(turned, abs=0.03)
     bins = table.drop("all", level="turning")["windows"].groupby(["method", "duration"]).sum()
     assert (bins == table.xs("all", level="turning")["windows"]).all()
+
+
+@pytest.mark.parametrize("method", SPEED_METHODS)
+def test_each_outage_is_an_estimate_by_itself(drive: Recording, method: str) -> None:
+    """Whatever the runs of one table share."""
+    errors = outage_errors(drive, (method,), (7.0,), 5.0, first=14.0)
+    assert len(errors) == 4
+    for row in errors.itertuples():
+        end = row.start + row.duration
+        alone = estimate_speed(drive, method=method, aid_until=row.start)
+        truth = np.interp(end, drive.wheel.index, drive.wheel["speed"])
+        assert row.error == pytest.approx(np.interp(end, alone.index, alone["speed"]) - truth, abs=1e-10)
+        assert row.std == pytest.approx(np.interp(end, alone.index, alone["speed_std"]), rel=1e-10)
 
 
 def test_the_aid_after_an_outage_began_only_scores(drive: Recording) -> None:
