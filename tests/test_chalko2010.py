@@ -17,6 +17,8 @@ from papers_repro.chalko2010.experiments import MOTIONS, exact_readings, simulat
 from papers_repro.comparison import Report, whole
 from papers_repro.report import deviations
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def small(tmp_path_factory: pytest.TempPathFactory) -> tuple[Report, Path]:

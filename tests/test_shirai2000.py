@@ -31,6 +31,7 @@ def runs():
     return lambda sensors: np.asarray(many(sensors, PASSAGE, KEYS))[:, -1]
 
 
+@pytest.mark.slow
 def test_perfect_gyros_find_the_passage_and_the_wheels_count_to_a_pulse(runs):
     found = runs(PERFECT)
     # The accelerometer's own noise, 5 ug/sqrt(Hz), leaves millimetres.
@@ -39,6 +40,7 @@ def test_perfect_gyros_find_the_passage_and_the_wheels_count_to_a_pulse(runs):
     assert found[:, 2, 0].std() > 0.1
 
 
+@pytest.mark.slow
 def test_a_bias_stays_in_the_gyro_chains_alone(runs):
     sensors = replace(PERFECT, accelerometer_bias=jnp.array(1e-2))
     moved = runs(sensors) - runs(PERFECT)
@@ -48,6 +50,7 @@ def test_a_bias_stays_in_the_gyro_chains_alone(runs):
     assert np.abs(moved[:, 2, 2]).max() < 0.02 * np.abs(moved[:, 0, 2]).max()
 
 
+@pytest.mark.slow
 def test_vibration_is_rectified_by_the_closed_form(runs):
     moved = runs(replace(PERFECT, vibration=jnp.array(0.1))) - runs(PERFECT)
     # The shaking is as large as the pace is fast, so the ramps have less of it.
@@ -55,6 +58,7 @@ def test_vibration_is_rectified_by_the_closed_form(runs):
     assert np.abs(moved[:, :2, 2]).max() < 0.1 * moved[:, 2, 2].mean()
 
 
+@pytest.mark.slow
 def test_wheel_scale_lengthens_the_way_and_nothing_else(runs):
     moved = runs(replace(PERFECT, wheel_scale=jnp.array(0.01)))
     np.testing.assert_allclose(moved[:, 2, 0], 1.01 * runs(PERFECT)[:, 2, 0], rtol=1e-5)

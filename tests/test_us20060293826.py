@@ -57,12 +57,14 @@ def test_a_wrong_correction_is_unexplained():
     assert equation_findings([wrong, silent]) == []
 
 
+@pytest.mark.slow
 def test_verdicts_and_findings_are_the_recorded_ones(small):
     report, _ = small
     assert deviations(report, Path(paper.__file__).parent / "paper.toml") == []
     assert [c.verdict for c in report.comparisons] == 7 * ["match"]
 
 
+@pytest.mark.slow
 def test_pictures_and_errors_are_written(small):
     report, output = small
     assert {held.file for held in report.outputs} == {path.name for path in output.iterdir()}
@@ -98,6 +100,7 @@ def test_static_calibration_leaves_noise_alone():
     assert np.abs(moving - readings.f_b).std() > np.abs(f_b - still.f_b).std()
 
 
+@pytest.mark.slow
 def test_growth_is_that_of_the_linearised_equation():
     growth = error_growth(curvy_drive())
     assert 9 < growth.turning[-1] < 11
@@ -119,6 +122,7 @@ def test_limit_of_the_region(share, expected):
     assert paper._limit([1.0, 2.0, 3.0], share) == expected
 
 
+@pytest.mark.slow
 def test_real_outages_are_shown_or_said_to_be_missing(small, tmp_path, monkeypatch):
     assert small[0].remarks[-1].startswith("No real outages: rtk-drive is not here")
     monkeypatch.setattr(outages, "load_dataset", lambda name: curvy_recording())
