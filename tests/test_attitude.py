@@ -4,14 +4,14 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from altijax.attitude import RESCUED, course_attitude, fit_attitude, fit_attitudes, hold_attitudes
 from altijax.least_squares import CONVERGED, NOT_FINITE, STEPS_USED_UP, levenberg_marquardt
 from altijax.rotations import euler_to_matrix, matrix_to_euler, wrap_angle
+from tests.quick import quick_jit
 
 PRIOR, NOISE = np.radians(10.0), 0.1
 UP = np.array([0.0, 0.0, 9.81])
@@ -156,12 +156,12 @@ def test_derivatives_are_those_of_the_minimum() -> None:
         return fits.euler, fits.covariance, fits.cost
 
     for fit in (at_once, each):
-        fit = jax.jit(fit)
-        forward = jax.jit(lambda a, t, fit=fit: jax.jvp(fit, a, t)[1])(arguments, tangents)
-        ahead, behind = (fit(*(a + e * t for a, t in zip(arguments, tangents, strict=True))) for e in (1e-4, -1e-4))
+        forward = quick_jit(lambda a, t, fit=fit: jax.jvp(fit, a, t)[1])(arguments, tangents)
+        value = quick_jit(fit)
+        ahead, behind = (value(*(a + e * t for a, t in zip(arguments, tangents, strict=True))) for e in (1e-4, -1e-4))
         for f, a, b in zip(forward, ahead, behind, strict=True):
             np.testing.assert_allclose(f, (a - b) / 2e-4, rtol=1e-5, atol=1e-6)
-    backward = jax.jit(lambda a, c: jax.vjp(at_once, *a)[1](c))(arguments, forward)
+    backward = quick_jit(lambda a, c: jax.vjp(at_once, *a)[1](c))(arguments, forward)
     one = sum(float(jnp.vdot(f, f)) for f in forward)
     other = sum(float(jnp.vdot(b, t)) for b, t in zip(backward, tangents, strict=True))
     # each and all at once are the same to rounding, so one's derivative serves the other's transpose
@@ -176,7 +176,7 @@ def test_everything_is_finite_for_finite_input(numbers: list[float]) -> None:
         assert np.isfinite(leaf).all()
 
 
-@jax.jit
+@quick_jit
 def values_and_slopes(f_b, f_n, euler0):
     def fit(f_b, f_n, euler0):
         found = fit_attitude(f_b, f_n, euler0, prior_std=0.5, measurement_std=NOISE)
@@ -190,7 +190,7 @@ def test_of_several_minima_the_lowest_is_found_from_many_starts() -> None:
     prior = np.radians(60.0)
     data = tuple(jnp.asarray(x) for x in epochs(200, seed=7, prior=prior))
 
-    @jax.jit
+    @quick_jit
     def costs(f_b, f_n, euler0):
         def of(starts):
             def fit(*epoch):

@@ -8,7 +8,6 @@ everywhere.
 import importlib
 import inspect
 from dataclasses import fields, is_dataclass
-from functools import partial
 from types import FunctionType
 
 import jax
@@ -19,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from altijax import motions, roads
 from tests.docstrings import Entry, public_functions, public_records, section
+from tests.quick import quick_jit
 
 CORE = [
     "rotations",
@@ -59,11 +59,6 @@ SIZES = {
 # Sizes of records that each constructor chooses for itself.
 FREE = {"terms", "legs", "waves", "states"}
 BATCHES = [(), (5,), (2, 5)]
-
-# On a few numbers XLA's optimizations take a hundred times as long as they could ever save.
-jit_in_haste = partial(
-    jax.jit, compiler_options={"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
-)
 
 FUNCTIONS = [pytest.param(f, id=f"{name}.{f.__name__}") for name in CORE for f in public_functions(name)]
 RECORDS = [pytest.param(r, id=f"{name}.{r.__name__}") for name in CORE for r in public_records(name)]
@@ -237,7 +232,7 @@ def test_jit_and_vmap_change_nothing(function: FunctionType) -> None:
     atol = 1e-8 if function.__module__ == "altijax.earth" else 1e-11
     static = {name: value for name, value in made.items() if isinstance(value, str)}
     arrays = {name: value for name, value in made.items() if name not in static}
-    jitted = jit_in_haste(lambda arrays: function(**arrays, **static))(arrays)
+    jitted = quick_jit(lambda arrays: function(**arrays, **static))(arrays)
     # what is jitted where it is defined is so either way
     expected = jitted if isinstance(function, jax.stages.Wrapped) else function(**made)
     close(jitted, expected, atol)
@@ -245,7 +240,7 @@ def test_jit_and_vmap_change_nothing(function: FunctionType) -> None:
     if batched:
         axes = {name: 0 if name in batched else None for name in arrays}
         vmapped = jax.vmap(lambda arrays: function(**arrays, **static), in_axes=(axes,), out_axes=batch_axes(function))
-        close(jit_in_haste(vmapped)(arrays), expected, atol)
+        close(quick_jit(vmapped)(arrays), expected, atol)
 
 
 @pytest.mark.parametrize("function", FUNCTIONS)
@@ -268,7 +263,7 @@ def test_derivatives_are_finite_and_agree(function: FunctionType) -> None:
     shapes = jax.eval_shape(of_arrays, *primals)
     cotangents = [jnp.asarray(rng.standard_normal(v.shape), v.dtype) for v in shapes]
 
-    @jit_in_haste
+    @quick_jit
     def both_modes(primals: list, tangents: list, cotangents: list) -> tuple:
         values, forward = jax.jvp(of_arrays, primals, tangents)
         return values, forward, jax.vjp(of_arrays, *primals)[1](cotangents)

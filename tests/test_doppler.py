@@ -1,7 +1,5 @@
 """Doppler receiver: what it reports of a known motion, and the conversions of Chalko's Eq. (1)."""
 
-from functools import partial
-
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -9,13 +7,12 @@ import pytest
 
 from altijax import doppler
 from altijax.doppler import DopplerReceiver
+from tests.quick import quick_jit
 
 # Compiled whole, and with few shapes, these tests take a fraction of the time.
 doppler_velocity = jax.jit(doppler.doppler_velocity, static_argnames="epochs")
 velocity_to_course = jax.jit(doppler.velocity_to_course)
 course_to_velocity = jax.jit(doppler.course_to_velocity)
-# Where compiling takes longer than running, nothing is optimised.
-quick_jit = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 
 KEY = jax.random.key(0)
 T = np.linspace(10, 40, 3001)

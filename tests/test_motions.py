@@ -16,9 +16,8 @@ from altijax import motions, roads
 from altijax.motions import Readings, Windsurfer, flight_pose, ideal_readings, road_pose, windsurfer_pose
 from altijax.roads import Road, SpeedProfile
 from altijax.rotations import matrix_to_euler
+from tests.quick import quick_jit
 
-# Where compiling takes longer than running, nothing is optimised.
-quick_jit = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 # Compiled whole, and with few shapes, these tests take a fraction of the time.
 circular_road = quick_jit(roads.circular_road)
 gybing_windsurfer = quick_jit(motions.gybing_windsurfer)

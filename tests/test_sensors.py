@@ -11,6 +11,7 @@ import scipy.signal
 
 from altijax import sensors
 from altijax.sensors import Accelerometer, Gyro
+from tests.quick import quick_jit
 
 # Compiled whole, and with few shapes, these tests take a fraction of the time.
 accelerometer_output = jax.jit(sensors.accelerometer_output)
@@ -18,8 +19,6 @@ gyro_output = jax.jit(sensors.gyro_output)
 correct_accelerometer = jax.jit(sensors.correct_accelerometer)
 correct_gyro = jax.jit(sensors.correct_gyro)
 saturated = jax.jit(sensors.saturated)
-# Where compiling takes longer than running, nothing is optimised.
-quick_jit = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 
 KEY = jax.random.key(0)
 DT = 0.01

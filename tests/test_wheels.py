@@ -1,7 +1,6 @@
 """Wheel pulses against closed forms, and way, speed and yaw rate back from pulses."""
 
 import dataclasses
-from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -10,6 +9,7 @@ import pytest
 
 from altijax import wheels
 from altijax.wheels import WheelSensor
+from tests.quick import quick_jit
 
 # Compiled whole, and with few shapes, these tests take a fraction of the time.
 wheel_pulses = jax.jit(wheels.wheel_pulses, static_argnames="max_pulses")
@@ -17,8 +17,6 @@ pulse_distance = jax.jit(wheels.pulse_distance)
 wheel_speeds = jax.jit(wheels.wheel_speeds)
 correct_wheel_speeds = jax.jit(wheels.correct_wheel_speeds)
 yaw_rate_from_wheels = jax.jit(wheels.yaw_rate_from_wheels)
-# Where compiling takes longer than running, nothing is optimised.
-quick_jit = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 0})
 
 
 def sensor(n=2, **parameters):
