@@ -78,22 +78,15 @@ def turned(recording: Recording) -> Recording:
     imu, reference = recording.imu, recording.reference
     if imu is None or reference is None:
         raise ValueError(f"recording {recording.name!r} has no IMU or no reference")
-    angles = ["roll", "pitch", "heading"]
-    C, of_device = (np.asarray(x) for x in _turned_angles(reference[angles].to_numpy(float)))
+    C = euler_to_matrix(jnp.radians(jnp.array(MOUNTING)))
     imu, reference = imu.copy(), reference.copy()
     for columns in (["ax", "ay", "az"], ["gx", "gy", "gz"]):
-        imu[columns] = imu[columns].to_numpy() @ C
-    reference[angles] = of_device
-    return replace(recording, name=f"{recording.name}, turned", imu=imu, reference=reference)
-
-
-@jax.jit
-def _turned_angles(angles: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """The mounting as a matrix, and roll, pitch and heading (time, 3) of a device so mounted from its vehicle's."""
-    C = euler_to_matrix(jnp.radians(jnp.array(MOUNTING)))
-    roll, pitch, heading = angles.T
+        imu[columns] = imu[columns].to_numpy() @ np.asarray(C)
+    roll, pitch, heading = reference[["roll", "pitch", "heading"]].to_numpy(float).T
     euler = matrix_to_euler(euler_to_matrix(jnp.stack([roll, pitch, heading_to_yaw(heading)], -1)) @ C)
-    return C, jnp.stack([euler[:, 0], euler[:, 1], yaw_to_heading(euler[:, 2])], -1)
+    reference[["roll", "pitch"]] = np.asarray(euler[:, :2])
+    reference["heading"] = np.asarray(yaw_to_heading(euler[:, 2]))
+    return replace(recording, name=f"{recording.name}, turned", imu=imu, reference=reference)
 
 
 def judge(recording: Recording) -> pd.DataFrame:

@@ -120,7 +120,7 @@ def epochs_of(recording: Recording, *, rate: float = 50.0) -> Epochs:
         ends = np.stack([[np.interp(e, t_imu, column) for column in integral.T] for e in edges])
         samples = ((ends[1] - ends[0]) / (edges[1] - edges[0])).T
     else:
-        samples = np.stack([np.interp(t, t_imu, column) for column in readings.T], -1)
+        samples = np.asarray(resample(t, t_imu, readings, np.inf, axis=-2)[0])
     velocity = gnss[["v_e", "v_n", "v_u"]].dropna()
     t_knots = velocity.index.to_numpy(float) - start
     inside = (t_knots >= 0) & (t_knots <= t[-1])
