@@ -34,6 +34,7 @@ def test_verbs_take_what_is_promised_by_keyword(verb: str, arguments: tuple[str,
     assert set(arguments) <= set(keyword_only)
 
 
+@pytest.mark.slow
 def test_a_drive_needs_no_reference_and_serves_every_verb() -> None:
     """On the shipped recording, where the nose of the IMU is 1.4 degrees down and the wheel scale is 1.006."""
     recording = altijax.load_dataset("hill-road")

@@ -38,6 +38,7 @@ record = jax.jit(
 drive = jax.jit(lambda manoeuvres: town_drive(manoeuvres, jnp.arange(30001) / 100, 9.80665))
 
 
+@pytest.mark.slow
 def test_five_minutes_with_turns() -> None:
     calibration = calibrate_stretches(drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665, DENSITY))
     table = calibration.table
@@ -58,6 +59,7 @@ def test_five_minutes_with_turns() -> None:
     assert np.all(np.abs(hidden.table["value"] - TRUTH) < 4 * hidden.table["std"])
 
 
+@pytest.mark.slow
 def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
     with pytest.warns(UserWarning, match="magnetometer"):
         recording = read_recording(data_dir / "comma2k19-example")
@@ -76,6 +78,7 @@ def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
     assert part.held_out.loc["wheel", "fitted"] < part.held_out.loc["wheel", "nominal"]
 
 
+@pytest.mark.slow
 def test_without_wheels_the_others_are_found_and_theirs_are_named(data_dir: Path) -> None:
     calibration = calibrate_drive(read_recording(data_dir / "rtk-drive"))
     table = calibration.table

@@ -2,6 +2,7 @@
 
 import jax
 import numpy as np
+import pytest
 
 from altijax.calibration.drive_model import DRIVE_PARAMETERS
 from altijax.calibration.experiment_design import CHANGES, driving_protocol, manoeuvre_gains
@@ -12,6 +13,7 @@ gains = jax.jit(manoeuvre_gains)
 STRAIGHT = Manoeuvres(turning=0.05, slope=0.0)
 
 
+@pytest.mark.slow
 def test_gradient_is_that_of_differences() -> None:
     bits, added = gains(Manoeuvres())
     step = 1e-3

@@ -182,6 +182,7 @@ def test_rtk_drive(rtk: Recording) -> None:
     assert rms(rtk, ["accelerometer_bias_x"], "slope", rtk.imu.index[0] + 110.0) <= 1.5
 
 
+@pytest.mark.slow
 def test_two_standard_deviations_cover_the_real_drives_out_of_sample(comma: Recording, rtk: Recording) -> None:
     for recording, until in ((comma, 20.0), (rtk, rtk.imu.index[0] + 110.0)):
         for method, names in (

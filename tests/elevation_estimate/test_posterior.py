@@ -81,6 +81,7 @@ def test_the_error_bar_is_that_of_many_instruments(drive: Drive) -> None:
     np.testing.assert_allclose(np.hypot(spread, road)[500::500], stated[500::500], rtol=0.15)
 
 
+@pytest.mark.slow
 def test_bars_cover_simulated_drives() -> None:
     """Nine drives of unknown constants; benchmarks/elevation.py does it with 210, and tighter."""
     known = ("none", "ends", "first third")

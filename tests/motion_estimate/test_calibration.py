@@ -29,6 +29,7 @@ def found(recording: Recording) -> Calibration:
     return calibrate_motion([recording], NAMES, method="batch", until=40.0)
 
 
+@pytest.mark.slow
 def test_batch_finds_biases(found: Calibration) -> None:
     off = found.values - np.array(list(PLANTED.values()))
     assert (np.abs(off) < [0.03, 0.03, 0.001]).all(), found
@@ -38,6 +39,7 @@ def test_batch_finds_biases(found: Calibration) -> None:
     assert roll[["start", "until", "end"]].tolist() == pytest.approx([8.0, 40.0, 60.0])
 
 
+@pytest.mark.slow
 def test_value_and_error_are_the_prior_of_the_next_batch(recording: Recording, found: Calibration) -> None:
     estimate = estimate_motion(recording, calibration=found)
     # What is left to find beside a calibration that is trusted.

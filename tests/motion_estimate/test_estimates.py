@@ -78,6 +78,7 @@ def test_truth_lies_within_the_stated_errors(flight: Recording, batch: pd.DataFr
     assert 0.5 < batch.attrs["nis"] < 2.0
 
 
+@pytest.mark.slow
 def test_without_a_gyro_the_direction_of_travel_tells_the_attitude() -> None:
     """A climb that is reported later than the rest is noticed."""
     recording = flown(slope=0.15, wavelength=100.0, later_climb=0.1)

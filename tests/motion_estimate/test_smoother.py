@@ -77,6 +77,7 @@ def start(readings: MotionReadings) -> tuple:
     return window_attitudes(readings, np.float64(0.0), np.float64(2.0), np.int64(9), np.bool_(True))
 
 
+@pytest.mark.slow
 def test_windows_come_near_and_passes_end() -> None:
     readings, _ = simulated(0)
     C = truth(np.asarray(instants_at(readings, jnp.zeros(()))))[0]
@@ -109,6 +110,7 @@ def test_errors_have_the_size_of_their_bars() -> None:
     assert 6.9 < np.mean(squares) < 17.1, squares
 
 
+@pytest.mark.slow
 def test_the_likelihood_has_its_gradient() -> None:
     readings, _ = simulated(1)
     fit, noise = solved(readings)

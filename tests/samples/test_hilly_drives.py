@@ -25,6 +25,7 @@ def test_the_wheels_turn_as_fast_as_heights_and_distances_allow() -> None:
     assert (climbed.iloc[1:] <= 0.2 * way.loc[heights.index].diff().iloc[1:] + 0.02).all()
 
 
+@pytest.mark.slow
 def test_where_heights_are_known_no_error_is_counted() -> None:
     recording = hilly_drive(0)
     counts = {known: errors_and_bars(recording, known)[0].size for known in ("none", "ends", "first third")}
