@@ -11,9 +11,11 @@ from altijax.programs import KEPT_PROGRAMS, keep_programs_as_told
 
 jax.config.update("jax_enable_x64", True)
 
-# What one worker, notebook or run has compiled, all later ones load.
+# What one worker, notebook or run has compiled, all later ones load; but for the thousands of small programs of tests,
+# as JAX looks at every program in the folder whenever it adds one.
 os.environ.setdefault(KEPT_PROGRAMS, "1")
 keep_programs_as_told()
+jax.config.update("jax_persistent_cache_min_compile_time_secs", 0.1)
 
 MAPS = Path("/proc/self/maps")
 MANY_MAPS = 40_000
