@@ -5,15 +5,21 @@ import warnings
 from dataclasses import dataclass
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
 from altijax.constants import STANDARD_GRAVITY
 from altijax.earth import gravity_of
 from altijax.recordings import Recording
-from altijax.signals import resample
-from altijax.wheels import WheelSensor, yaw_rate_from_wheels
+from altijax.series import interpolated, supported
+
+# A row that comes later than this after the one before, in s, comes after a gap, not after a pause between bursts.
+_PAUSE = 1.0
+# Rows come in bursts where they stand this many times closer than they come on average.
+_BURSTING = 3.0
+# Samples on the grid: 11 hours at 100 Hz, some 5 GiB of memory for an estimate.
+_MOST_SAMPLES = 2**22
+Array = jax.Array | np.ndarray
 
 
 @jax.tree_util.register_dataclass
@@ -41,18 +47,18 @@ class Drive:
         True where they are wheel speeds, False for GNSS ground speeds.
     """
 
-    t: jax.Array
-    f: jax.Array
-    yaw_rate: jax.Array
-    gravity: jax.Array
-    supported: jax.Array
-    t_speed: jax.Array
-    speed: jax.Array
-    from_wheel: jax.Array
+    t: Array
+    f: Array
+    yaw_rate: Array
+    gravity: Array
+    supported: Array
+    t_speed: Array
+    speed: Array
+    from_wheel: Array
 
 
 def drive_arrays(recording: Recording, *, turns: bool) -> tuple[Drive, np.ndarray]:
-    """Readings of a recording as arrays; call it in double precision (`jax.enable_x64`).
+    """Readings of a recording as arrays of NumPy, in double precision.
 
     Parameters
     ----------
@@ -71,26 +77,89 @@ def drive_arrays(recording: Recording, *, turns: bool) -> tuple[Drive, np.ndarra
     Raises
     ------
     ValueError
-        If a stream is missing.
+        If a stream is missing, or the IMU's times make a grid too long to work on.
     """
     imu, start = imu_of(recording), start_of(recording)
     t_imu = imu.index.to_numpy(float) - start
-    usual = float(np.median(np.diff(t_imu)))
-    t = np.linspace(0, t_imu[-1], round(t_imu[-1] / usual) + 1)
-    f, supported = resample(t, t_imu, imu[["ax", "ay", "az"]].to_numpy(), max(5 * usual, 0.1), axis=-2)
+    step = usual_step(t_imu)
+    count = round(t_imu[-1] / step) + 1
+    if count > _MOST_SAMPLES:
+        raise ValueError(
+            f"recording {recording.name!r} is {t_imu[-1]:.6g} s long with {1 / step:.6g} IMU samples a second, which "
+            f"makes {count} of them; more than {_MOST_SAMPLES} cannot be worked on at once: cut it into parts, or mend "
+            "its times"
+        )
+    t = np.linspace(0, t_imu[-1], count)
+    t_imu = without_bursts(t_imu)
     t_speed, speed = speed_readings(recording)
     t_speed = t_speed - start
     drive = Drive(
-        t=jnp.asarray(t),
-        f=f,
-        yaw_rate=_yaw_rate(recording, t) if turns else jnp.zeros_like(t),
-        gravity=jnp.asarray(gravity_at(recording)),
-        supported=supported & resample(t, t_speed, speed, max(5 * float(np.median(np.diff(t_speed))), 0.5))[1],
-        t_speed=jnp.asarray(t_speed),
-        speed=jnp.asarray(speed),
-        from_wheel=jnp.asarray(recording.wheel is not None),
+        t=t,
+        f=interpolated(t, t_imu, imu[["ax", "ay", "az"]].to_numpy(float)),
+        yaw_rate=_yaw_rate(recording, t) if turns else np.zeros(count),
+        gravity=np.asarray(gravity_at(recording)),
+        supported=supported(t, t_imu, max(5 * step, 0.1)) & supported(t, t_speed, max(5 * usual_step(t_speed), 0.5)),
+        t_speed=t_speed,
+        speed=speed,
+        from_wheel=np.asarray(recording.wheel is not None),
     )
     return drive, t + start
+
+
+def usual_step(t: np.ndarray) -> float:
+    """Time from one sample of a sensor to the next.
+
+    Parameters
+    ----------
+    t : (samples,) s
+        Times of the rows, not decreasing.
+
+    Returns
+    -------
+    step : float
+        The median interval; where rows come in bursts, the mean one, gaps of more than 1 s left out.
+    """
+    steps = np.diff(t)
+    median = float(np.median(steps))
+    return _mean_step(steps) if _in_bursts(steps) else median
+
+
+def without_bursts(t: np.ndarray) -> np.ndarray:
+    """Times at which rows were sampled that carry the time when they arrived, many at once.
+
+    Parameters
+    ----------
+    t : (samples,) s
+        Times of the rows, not decreasing.
+
+    Returns
+    -------
+    t : (samples,) s
+        The rows of each burst spread evenly over the time since the burst before, its last row where it was; after a
+        gap, and at first, they stand at the usual step. The times themselves where they do not come in bursts.
+    """
+    steps = np.diff(t)
+    if not _in_bursts(steps):
+        return t
+    mean = _mean_step(steps)
+
+    def spread(t: np.ndarray) -> np.ndarray:
+        last = np.flatnonzero(np.append(np.diff(t) > mean, True))
+        before = t[last[0]] - mean * (last[0] + 1)
+        return np.interp(np.arange(t.size), [-1, *last], [before, *t[last]])
+
+    parts = np.split(t, np.flatnonzero(steps > _PAUSE) + 1)
+    return np.maximum.accumulate(np.concatenate([spread(part) for part in parts]))
+
+
+def _in_bursts(steps: np.ndarray) -> bool:
+    return _mean_step(steps) > _BURSTING * float(np.median(steps))
+
+
+def _mean_step(steps: np.ndarray) -> float:
+    """Mean interval, gaps left out."""
+    near = steps <= _PAUSE
+    return float(np.mean(steps[near] if near.any() else steps))
 
 
 def speed_readings(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
@@ -172,19 +241,19 @@ def gravity_at(recording: Recording) -> float:
     return gravity_of(math.sin(latitude) ** 2, 0.0 if height is None else height)
 
 
-def _yaw_rate(recording: Recording, t: np.ndarray) -> jax.Array:
+def _yaw_rate(recording: Recording, t: np.ndarray) -> np.ndarray:
     """Rate of turn on the grid: from the wheels as the paper has it, else from the gyro."""
     start, wheel, pair = start_of(recording), recording.wheel, wheel_pair(recording)
     if wheel is not None and pair is not None and recording.track_width is not None:
-        sensor = WheelSensor(track_width=recording.track_width)
-        rate = yaw_rate_from_wheels(sensor, wheel[list(pair)].to_numpy(float).T)
-        return resample(t, wheel.index.to_numpy(float) - start, rate, np.inf)[0]
+        left, right = (wheel[name].to_numpy(float) for name in pair)
+        rate = (right - left) / recording.track_width  # as `yaw_rate_from_wheels` has it
+        return interpolated(t, wheel.index.to_numpy(float) - start, rate)
     imu = imu_of(recording)
     if "gz" in imu:
-        return resample(t, imu.index.to_numpy(float) - start, imu["gz"].to_numpy(float), np.inf)[0]
+        return interpolated(t, without_bursts(imu.index.to_numpy(float) - start), imu["gz"].to_numpy(float))
     warnings.warn(
         f"recording {recording.name!r} has no rate of turn (left and right wheel speeds with a track width, or a "
         "gyro): it is taken as zero, so that turns read as upward accelerations of v^2 w^2 / 2g",
         stacklevel=4,
     )
-    return jnp.zeros(t.size)
+    return np.zeros(t.size)

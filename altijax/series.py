@@ -76,3 +76,29 @@ def means_between(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.nd
     integral = np.concatenate([np.zeros((1, values.shape[1])), np.cumsum(areas, 0)])
     at_edges = np.stack([np.interp(edges, t, column) for column in integral.T], -1)
     return np.diff(at_edges, axis=-2) / np.diff(edges)[..., None]
+
+
+def low_pass(t: np.ndarray, values: np.ndarray, cutoff: float) -> np.ndarray:
+    """Zero-phase low pass, the same filter as `signals.low_pass`.
+
+    Parameters
+    ----------
+    t : (time,) s
+        Times, uniformly spaced. At least two.
+    values : (..., time)
+        Series.
+    cutoff : float
+        Frequency of half amplitude, Hz; at or above half the sampling rate nothing is filtered.
+
+    Returns
+    -------
+    filtered : (..., time)
+        Series of the same unit.
+    """
+    share = np.linspace(0, 1, t.size)
+    line = values[..., :1] + (values[..., -1:] - values[..., :1]) * share
+    rest = values - line
+    odd = np.concatenate([rest, -rest[..., -2:0:-1]], -1)
+    passed = (np.cos(np.pi / 2 * share) * np.tan(np.pi * min(cutoff * (t[-1] - t[0]) / (t.size - 1), 0.5))) ** 4
+    response = passed / (passed + np.sin(np.pi / 2 * share) ** 4)
+    return line + np.fft.irfft(np.fft.rfft(odd) * response, odd.shape[-1])[..., : t.size]

@@ -5,6 +5,7 @@ import dataclasses
 import boule
 import jax
 import numpy as np
+import pandas as pd
 import pytest
 
 from altijax import drives
@@ -52,6 +53,49 @@ def test_arrays_are_uniform_and_count_from_the_first_sample() -> None:
     np.testing.assert_array_equal(t, EXACT.imu.index)
     np.testing.assert_allclose(drive.f, EXACT.imu[["ax", "ay", "az"]], atol=1e-9)
     assert drive.from_wheel and drive.supported.all()
+
+
+K = np.arange(6000)
+EVERY_10_MS = (K + 1) * 0.01
+AT_ONCE = (K // 20 + 1) * 0.2 + (K % 20) * 1e-4
+
+
+def test_bursts_are_spread_over_the_time_since_the_one_before() -> None:
+    """Rows that carry the time they arrived, 20 within 2 ms, then 0.2 s of nothing."""
+    assert drives.usual_step(AT_ONCE) == pytest.approx(0.01, rel=0.01)
+    np.testing.assert_allclose(drives.without_bursts(AT_ONCE), EVERY_10_MS, atol=0.005)
+    # across a gap neither the rows before nor those behind it are moved into it
+    gapped = AT_ONCE + 30.0 * (K >= 3000)
+    np.testing.assert_allclose(drives.without_bursts(gapped), EVERY_10_MS + 30.0 * (K >= 3000), atol=0.005)
+    assert drives.usual_step(gapped) == pytest.approx(0.01, rel=0.01)
+
+
+def test_ordinary_times_are_as_they_are() -> None:
+    """Jitter, lost rows and gaps are no bursts: the median interval counts."""
+    rng = np.random.default_rng(0)
+    jittered = EVERY_10_MS + 0.004 * rng.uniform(-1, 1, K.size)
+    for t in (EVERY_10_MS, jittered, jittered[rng.random(K.size) > 0.4], jittered + 900.0 * (K >= 3000)):
+        assert drives.without_bursts(t) is t
+        assert drives.usual_step(t) == np.median(np.diff(t))
+
+
+def test_elevation_of_bursts_is_that_of_even_rows() -> None:
+    last = np.append(np.arange(20, len(EXACT.imu), 20), len(EXACT.imu)) - 1
+    arrived = EXACT.imu.index.to_numpy()[last[np.searchsorted(last, np.arange(len(EXACT.imu)))]]
+    late = EXACT.imu.set_index(pd.Index(arrived + 1e-5 * (np.arange(len(EXACT.imu)) % 20), name="t"))
+    burst, _ = drives.drive_arrays(dataclasses.replace(EXACT, imu=late), turns=False)
+    even, _ = drives.drive_arrays(EXACT, turns=False)
+    shift = late.index[0] - EXACT.imu.index[0]
+    inside = (burst.t + shift < 59.5) & (burst.t > 0.5)
+    expected = np.interp(burst.t + shift, even.t, even.f[:, 0])
+    np.testing.assert_allclose(burst.f[inside, 0], expected[inside], atol=0.02)
+
+
+def test_a_grid_too_long_is_refused() -> None:
+    imu = EXACT.imu.copy()
+    imu.index = np.append(imu.index[:-1], 1e6)
+    with pytest.raises(ValueError, match="'exact' is 1e\\+06 s long with 50 IMU samples a second"):
+        drives.drive_arrays(dataclasses.replace(EXACT, imu=imu), turns=False)
 
 
 def test_wheel_speed_goes_before_gnss_speed() -> None:

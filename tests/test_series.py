@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from altijax.series import interpolated, means_between, supported
-from altijax.signals import interval_means, resample
+from altijax.series import interpolated, low_pass, means_between, supported
+from altijax.signals import interval_means, low_pass as low_pass_in_jax, resample
 
 
 def gapped() -> tuple[np.ndarray, np.ndarray]:
@@ -44,3 +44,12 @@ def test_means_hold_the_whole_integral_wherever_the_edges_are() -> None:
     edges = np.linspace(t[0], t[-1], 57)
     whole = np.diff(edges) @ means_between(edges, t, values)
     np.testing.assert_allclose(whole, np.trapezoid(values, t, axis=0), rtol=1e-12)
+
+
+def test_the_low_pass_is_that_of_signals() -> None:
+    t = 3.0 + 0.01 * np.arange(400)
+    walk = np.cumsum(np.random.default_rng(0).normal(size=(2, 400)), -1)
+    for cutoff in (0.1, 1.0, 20.0, np.inf):
+        for count in (2, 3, 400):
+            expected = low_pass_in_jax(t[:count], walk[:, :count], cutoff)
+            np.testing.assert_allclose(low_pass(t[:count], walk[:, :count], cutoff), expected, rtol=0, atol=1e-12)

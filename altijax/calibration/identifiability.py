@@ -5,7 +5,9 @@ know more of it than the prior: where its information, an eigenvalue of D J^T J 
 exceeds 1. That is the measure of `AttitudeFit.rank` too.
 """
 
+import math
 from dataclasses import dataclass, field
+from functools import partial
 
 import jax
 import jax.numpy as jnp
@@ -123,24 +125,28 @@ def identify_information(information: ArrayLike, prior_std: ArrayLike, names: tu
     ValueError
         If the shapes do not fit.
     """
-    information = require_shape("information", information, (len(names), len(names)))
-    prior_std = require_shape("prior_std", prior_std, (len(names),))
+    return Identification(names=names, **_learnt(information, prior_std, len(names)))
+
+
+@partial(jax.jit, static_argnames="terms")
+def _learnt(information: ArrayLike, prior_std: ArrayLike, terms: int) -> dict[str, jax.Array]:
+    information = require_shape("information", information, (terms, terms))
+    prior_std = require_shape("prior_std", prior_std, (terms,))
     scale = jnp.outer(prior_std, prior_std)
     values, vectors = jnp.linalg.eigh(information * scale)
     values, vectors = values[::-1], vectors[:, ::-1]
     rounding = jnp.maximum(values[0] * jnp.finfo(values.dtype).eps * values.size, jnp.finfo(values.dtype).tiny)
     covariance = scale * ((vectors / (1 + jnp.maximum(values, 0))) @ vectors.T)
     std = _safe.sqrt(jnp.diag(covariance))
-    return Identification(
-        names=names,
-        prior_std=prior_std,
-        std=std,
-        covariance=covariance,
-        data_covariance=scale * ((vectors / jnp.maximum(values, rounding)) @ vectors.T),
-        information=jnp.maximum(values, 0),
-        directions=vectors,
-        gained=jnp.log2(prior_std / std),
-    )
+    return {
+        "prior_std": prior_std,
+        "std": std,
+        "covariance": covariance,
+        "data_covariance": scale * ((vectors / jnp.maximum(values, rounding)) @ vectors.T),
+        "information": jnp.maximum(values, 0),
+        "directions": vectors,
+        "gained": jnp.log2(prior_std / std),
+    }
 
 
 def information_gain(jacobian: ArrayLike, prior_std: ArrayLike) -> jax.Array:
@@ -182,27 +188,42 @@ def describe_undetermined(identification: Identification) -> list[str]:
     sentences : list of str
         One for each group of parameters that belong together; none if all is determined.
     """
-    rank, names = int(identification.rank), identification.names
-    undetermined = identification.directions[:, rank:]
-    share = undetermined @ undetermined.T
+    names, everything = identification.names, range(len(identification.names))
+    if min(identification.information.tolist()) > 1:
+        return []
+    covariance, prior_std = identification.covariance.tolist(), identification.prior_std.tolist()
+    known = identification.information, identification.directions
+    share, _, _ = _undetermined(*known, [True for _ in everything])
     sentences = []
     for group in _groups(share.tolist()):
-        rows = jnp.asarray(group)
         # Directions of the group along which the data know less than the prior, in the parameters' own units.
-        values, vectors = jnp.linalg.eigh(share[rows][:, rows])
-        determined = vectors[:, values < 0.5]
+        _, values, vectors = (x.tolist() for x in _undetermined(*known, [i in group for i in everything]))
+        determined = [[vectors[i][k] / prior_std[i] for i in group] for k in everything if values[k] < 0.5]
         listed = " and ".join(names[i] for i in group)
-        if determined.shape[1] == 0:
+        if not determined:
             sentences.append(f"The data say less of {listed} than was known before.")
             continue
-        combinations = _echelon((determined.T / identification.prior_std[rows]).tolist())
         described = []
-        for combination in combinations:
-            weights = jnp.asarray(combination, identification.std.dtype)
-            std = float(jnp.sqrt(weights @ identification.covariance[rows][:, rows] @ weights))
+        for combination in _echelon(determined):
+            terms = list(zip(combination, group, strict=True))
+            std = math.sqrt(sum(a * b * covariance[i][j] for a, i in terms for b, j in terms))
             described.append(f"{_sum_of(combination, [names[i] for i in group])} can: std {std:.2g}")
         sentences.append(f"{listed} cannot be told apart here; {'; '.join(described)}.")
     return sentences
+
+
+@jax.jit
+def _undetermined(
+    information: jax.Array, directions: jax.Array, group: list[ArrayLike]
+) -> tuple[jax.Array, jax.Array, jax.Array]:
+    """Projector on the undetermined directions, and eigenvalues and vectors of what of it is of a group.
+
+    What is not of the group is taken for undetermined, of eigenvalue 1.
+    """
+    undetermined = jnp.where(information > 1, 0, directions)
+    share = undetermined @ undetermined.T
+    inside = jnp.asarray(group)
+    return share, *jnp.linalg.eigh(jnp.where(inside[:, None] & inside, share, jnp.eye(inside.size, dtype=share.dtype)))
 
 
 def _groups(share: list[list[float]]) -> list[list[int]]:

@@ -18,18 +18,21 @@ from altijax.calibration.parameters import PARAMETERS
 from altijax.calibration.records import Calibration, constants_table
 from altijax.calibration.serial_correlation import statistical_inefficiency
 from altijax.least_squares import levenberg_marquardt
+from altijax.padding import bucket, padded
 
 # Rounds of fit and noise. The first one trusts the data ten times more than they deserve at the prior.
 _ROUNDS, _FIRST = 4, 0.1
 # No reference and no model is better than this share of what the constants may change.
 _LEAST = 1e-5
 
-# Small steps are compiled by themselves one by one, whole functions at once.
-_identify = jax.jit(identify_information, static_argnames="names")
+# The smallest length that residuals are filled up to.
+_LEAST_TIMES = 1024
+
 _together = jax.jit(statistical_inefficiency)
 
 Residuals = Callable[[jax.Array], tuple[jax.Array, ...]]
-Found = tuple[jax.Array, jax.Array, tuple[jax.Array, ...]]
+Array = jax.Array | np.ndarray
+Found = tuple[Array, Array, tuple[Array, ...]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,15 +87,43 @@ def weighted_fit(residuals: Residuals, x0: jax.Array, noise: jax.Array) -> Found
     return fit.x, fit.covariance, residuals(fit.x)
 
 
-def fit_to_reference(
-    solve: Callable[[jax.Array, jax.Array], Found], unknowns: int, first: Sequence[jax.Array]
-) -> ReferenceFit:
+def linear_fit(lines: Sequence[tuple[np.ndarray, np.ndarray]], x0: np.ndarray, noise: np.ndarray) -> Found:
+    """The same where the residuals are linear in the unknowns, without a program.
+
+    Parameters
+    ----------
+    lines : sequence of pairs of ndarray
+        For each group the residuals (series, time) of unknowns zero, and their derivatives (series, time, unknowns).
+    x0 : (unknowns,)
+        Where to begin, which does not matter.
+    noise : (groups,)
+        Standard deviation of each group.
+
+    Returns
+    -------
+    x : (unknowns,)
+        Most probable values.
+    covariance : (unknowns, unknowns)
+        From data and prior.
+    residuals : tuple of arrays
+        At the minimum.
+    """
+    information, pull = np.eye(x0.size), np.zeros(x0.size)
+    for (constant, slope), std in zip(lines, noise, strict=True):
+        J = slope.reshape(-1, x0.size) / std
+        information += J.T @ J
+        pull -= J.T @ constant.reshape(-1) / std
+    x = np.linalg.solve(information, pull)
+    return x, np.linalg.inv(information), tuple(constant + slope @ x for constant, slope in lines)
+
+
+def fit_to_reference(solve: Callable[[Array, Array], Found], unknowns: int, first: Sequence[Array]) -> ReferenceFit:
     """Fit and noise in turns.
 
     Parameters
     ----------
     solve : callable
-        What `weighted_fit` gives for a problem, by x0 and noise.
+        What `weighted_fit` or `linear_fit` gives for a problem, by x0 and noise.
     unknowns : int
         How many.
     first : sequence of arrays
@@ -105,9 +136,10 @@ def fit_to_reference(
     """
     sizes = np.array([_size(np.asarray(r)) for r in first])
     least = np.maximum(_LEAST * sizes, np.finfo(float).tiny)
-    x, noise = jnp.zeros(unknowns), np.maximum(_FIRST * sizes, least)
+    x: Array = np.zeros(unknowns)
+    noise = np.maximum(_FIRST * sizes, least)
     for _ in range(_ROUNDS):
-        x, covariance, residuals = solve(x, jnp.asarray(noise))
+        x, covariance, residuals = solve(x, noise)
         used = noise
         noise = np.maximum([_noise(np.asarray(r)) for r in residuals], least)
     return ReferenceFit(
@@ -164,7 +196,7 @@ def calibration_from(
     known = prior.loc[names]
     units = known["uncertainty"].to_numpy(float)
     information = np.linalg.inv(covariance) - np.eye(len(names))
-    found = _identify(jnp.asarray(information / np.outer(units, units)), jnp.asarray(units), names=tuple(names))
+    found = identify_information(information / np.outer(units, units), units, tuple(names))
     std = np.sqrt(np.diag(covariance))
     table = pd.DataFrame(
         {
@@ -197,6 +229,8 @@ def _noise(r: np.ndarray) -> float:
         return 1.0
     means = np.sum(r, 1) / np.maximum(np.sum(there, 1), 1)
     rest = np.where(there, r - means[:, None], 0)
-    together = np.asarray(_together(rest))
+    # Zeros at the end, of no mean, add nothing to any product of neighbours.
+    filled = padded(padded(rest, bucket(rest.shape[0], 1), 0.0), bucket(rest.shape[1], _LEAST_TIMES), 0.0, axis=1)
+    together = np.asarray(_together(filled))[: rest.shape[0]]
     squares, counts = np.sum(rest**2, 1), np.sum(there, 1)
     return float(np.sqrt(np.sum(np.maximum(squares * together, (counts * means) ** 2)) / np.sum(counts)))

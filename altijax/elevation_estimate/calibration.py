@@ -5,20 +5,32 @@ from dataclasses import replace
 from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
 from altijax.calibration.parameters import PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
-from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
+from altijax.calibration.reference_fit import ReferenceFit, calibration_from, fit_to_reference, linear_fit
 from altijax.drives import Drive, drive_arrays, reference_heights, start_of
-from altijax.elevation_estimate.model import NOMINAL, UNCERTAINTY, elevation, uncertain_constants
+from altijax.elevation_estimate.model import (
+    NOMINAL,
+    UNCERTAINTY,
+    elevation_and_sensitivity,
+    uncertain_constants,
+    vertical_speed_at_start,
+)
 from altijax.elevation_estimate.posterior import Constants, Posterior, elevation_posterior
 from altijax.elevation_estimate.priors import prior_constants
 from altijax.recordings import Recording
+from altijax.series import interpolated
+from altijax.stages import stages
 
-Targets = list[tuple[jax.Array, jax.Array]]
+# The elevation is nearly linear in the constants: it takes two or three.
+_MOST_LINEARISATIONS = 20
+# A step of less than this share of a prior's standard deviation is none.
+_NO_STEP = 1e-7
+
+Heights = tuple[np.ndarray, np.ndarray]
 
 
 def calibrate_elevation(
@@ -50,7 +62,8 @@ def calibrate_elevation(
     names = list(names)
     if "initial_vertical_speed" in names and len(recordings) > 1:
         raise ValueError("initial_vertical_speed belongs to one recording: calibrate it on one alone")
-    with jax.enable_x64(True):
+    with jax.enable_x64(True), stages(f"calibration of {method!r}") as stage:
+        stage("readings")
         drives = [drive_arrays(recording, turns=method != "slope")[0] for recording in recordings]
         references = [reference_heights(recording) for recording in recordings]
         end = np.inf if until is None else until
@@ -61,38 +74,29 @@ def calibrate_elevation(
             )
         if method == "fused":
             return _calibrate_fused(recordings, drives, references, fitted, names)
+        stage("fit")
         prior = _prior(drives[0], names)
-        mean, unit = (jnp.asarray(prior.loc[names, column].to_numpy(float)) for column in ("nominal", "uncertainty"))
-        targets, whole = (
-            [(jnp.asarray(t[:n]), jnp.asarray(h[:n])) for (t, h), n in zip(references, counts, strict=True)]
-            for counts in (fitted, [t.size for t, _ in references])
-        )
-        static = {"names": tuple(names), "method": method}
-        nominal = _residuals(jnp.zeros(len(names)), drives, whole, mean, unit, **static)
-        first = [r[:, :n] - jnp.mean(r[:, :n]) for r, n in zip(nominal, fitted, strict=True)]
-        fit = fit_to_reference(
-            lambda x, noise: _solve(x, noise, drives, targets, mean, unit, **static), len(names), first
-        )
-        best = _residuals(jnp.asarray(fit.x), drives, whole, mean, unit, **static)
-        errors = [[np.asarray(r)[0] for r in pair] for pair in zip(nominal, best, strict=True)]
-        constants = dict(zip(names, np.asarray(mean) + np.asarray(unit) * fit.x, strict=True))
-        absorbed = _absorbed(drives, targets, constants, method, unit, fit.covariance, fit.noise)
-        return calibration_from(
-            method,
-            names,
-            fit.x,
-            fit.covariance,
-            _held_out(recordings, references, fitted, errors),
-            prior=prior,
-            absorbed=absorbed,
-        )
+        mean, unit = (prior.loc[names, column].to_numpy(float) for column in ("nominal", "uncertainty"))
+        targets = [(t[:n], heights[:n]) for (t, heights), n in zip(references, fitted, strict=True)]
+        fit = _fit(drives, targets, names, mean, unit, method)
+        constants = dict(zip(names, mean + unit * fit.x, strict=True))
+        stage("what the constants absorb")
+        absorbed = _absorbed(drives, targets, constants, method, unit, fit)
+        stage("errors")
+        nominal = dict(zip(names, mean, strict=True))
+        errors = [
+            [_linearised(values, drive, whole, names, method)[0] for values in (nominal, constants)]
+            for drive, whole in zip(drives, references, strict=True)
+        ]
+        held_out = _held_out(recordings, references, fitted, errors)
+        return calibration_from(method, names, fit.x, fit.covariance, held_out, prior=prior, absorbed=absorbed)
 
 
 def _prior(drive: Drive, names: Sequence[str]) -> pd.DataFrame:
     """`PARAMETERS`, with what the drive itself says of its vertical speed at the start."""
     if "initial_vertical_speed" not in names:
         return PARAMETERS
-    climb = float(elevation({}, drive, "shirai")["vertical_speed"][0])
+    climb = vertical_speed_at_start({}, drive, names, "shirai")
     slope = uncertain_constants(drive, "shirai")["initial_vertical_speed"]
     prior = PARAMETERS.copy()
     std = np.hypot(slope, UNCERTAINTY["initial_vertical_speed"])
@@ -100,74 +104,64 @@ def _prior(drive: Drive, names: Sequence[str]) -> pd.DataFrame:
     return prior
 
 
-@partial(jax.jit, static_argnames=("names", "method"))
-def _residuals(
-    x: jax.Array,
-    drives: list[Drive],
-    targets: Targets,
-    mean: jax.Array,
-    unit: jax.Array,
-    names: tuple[str, ...],
-    method: str,
-) -> tuple[jax.Array, ...]:
-    """Errors without their mean, a group a recording."""
-    values = dict(zip(names, mean + unit * x, strict=True))
-    errors = [_error(values, drive, target, method) for drive, target in zip(drives, targets, strict=True)]
-    return tuple((error - jnp.mean(error))[None] for error in errors)
+def _linearised(
+    values: dict[str, float], drive: Drive, target: Heights, names: Sequence[str], method: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Estimate less reference at the reference's times, and its derivatives (time, names), both without their means."""
+    found, sensitivity = elevation_and_sensitivity(values, drive, names, method)
+    t, heights = target
+    grid = np.asarray(drive.t)
+    error, slope = np.interp(t, grid, found["elevation"]) - heights, interpolated(t, grid, sensitivity)
+    return error - error.mean(), slope - slope.mean(0)
 
 
-@partial(jax.jit, static_argnames=("names", "method"))
-def _solve(
-    x0: jax.Array,
-    noise: jax.Array,
+def _fit(
     drives: list[Drive],
-    targets: Targets,
-    mean: jax.Array,
-    unit: jax.Array,
-    names: tuple[str, ...],
+    targets: list[Heights],
+    names: list[str],
+    mean: np.ndarray,
+    unit: np.ndarray,
     method: str,
-) -> Found:
-    return weighted_fit(lambda x: _residuals(x, drives, targets, mean, unit, names, method), x0, noise)
+) -> ReferenceFit:
+    """The constants in units of their priors, by Gauss-Newton steps; a group of residuals a recording."""
+    x, first = np.zeros(len(names)), None
+    for _ in range(_MOST_LINEARISATIONS):
+        values = dict(zip(names, mean + unit * x, strict=True))
+        found = [
+            _linearised(values, drive, target, names, method) for drive, target in zip(drives, targets, strict=True)
+        ]
+        first = [error[None] for error, _ in found] if first is None else first
+        lines = [((error - slope * unit @ x)[None], (slope * unit)[None]) for error, slope in found]
+        fit = fit_to_reference(partial(linear_fit, lines), len(names), first)
+        step, x = np.abs(fit.x - x).max(), fit.x
+        if step < _NO_STEP:
+            break
+    return fit
 
 
 def _absorbed(
     drives: list[Drive],
-    targets: Targets,
+    targets: list[Heights],
     constants: dict[str, float],
     method: str,
-    unit: jax.Array,
-    covariance: np.ndarray,
-    noise: np.ndarray,
+    unit: np.ndarray,
+    fit: ReferenceFit,
 ) -> pd.DataFrame:
     """By how much each constant moves for one unit of those left at nominal."""
     names = list(constants)
     others = [name for name in uncertain_constants(drives[0], method) if name not in names]
     if len(drives) > 1:
         others = [name for name in others if name != "initial_vertical_speed"]  # each recording has its own
-    start = NOMINAL | constants
-    if "initial_vertical_speed" in others:
-        start["initial_vertical_speed"] = float(elevation(constants, drives[0], method)["vertical_speed"][0])
-    both = (*names, *others)
-    units = np.append(np.asarray(unit), [UNCERTAINTY[name] for name in others])
-    at = jnp.asarray([start[name] for name in both])
-    slopes = _slopes(jnp.zeros(len(both)), drives, targets, at, jnp.asarray(units), names=both, method=method)
-    J = np.concatenate([np.asarray(slope)[0] / std for slope, std in zip(slopes, noise, strict=True)])
+    units = np.append(unit, [UNCERTAINTY[name] for name in others])
+    J = np.concatenate(
+        [
+            _linearised(constants, drive, target, [*names, *others], method)[1] * units / std
+            for drive, target, std in zip(drives, targets, fit.noise, strict=True)
+        ]
+    )
     mine, theirs = J[:, : len(names)], J[:, len(names) :]
-    moved = -covariance @ mine.T @ theirs
+    moved = -fit.covariance @ mine.T @ theirs
     return pd.DataFrame(moved * units[: len(names), None] / units[len(names) :], names, others)
-
-
-@partial(jax.jit, static_argnames=("names", "method"))
-def _slopes(
-    x: jax.Array,
-    drives: list[Drive],
-    targets: Targets,
-    mean: jax.Array,
-    unit: jax.Array,
-    names: tuple[str, ...],
-    method: str,
-) -> tuple[jax.Array, ...]:
-    return jax.jacfwd(lambda x: _residuals(x, drives, targets, mean, unit, names, method))(x)
 
 
 def _calibrate_fused(
@@ -240,9 +234,3 @@ def _held_out(
         interval = np.array([t[0], t[n - 1], t[-1]]) + start_of(recording)
         rows.append(held_out_row(recording.name, "elevation", "m", interval.tolist(), before, after))
     return held_out_table(rows)
-
-
-def _error(values: dict[str, jax.Array], drive: Drive, target: tuple[jax.Array, jax.Array], method: str) -> jax.Array:
-    """Estimate less reference at the reference's times."""
-    t, heights = target
-    return jnp.interp(t, drive.t, elevation(values, drive, method)["elevation"]) - heights

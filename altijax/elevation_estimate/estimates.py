@@ -13,6 +13,7 @@ from altijax.elevation_estimate.model import ELEVATION_METHODS
 from altijax.elevation_estimate.posterior import elevation_posterior
 from altijax.elevation_estimate.priors import prior_constants, with_corrected_turns
 from altijax.recordings import Recording
+from altijax.stages import stages
 
 
 def estimate_elevation(
@@ -61,18 +62,19 @@ def estimate_elevation(
     """
     require_method(method)
     known = None if known_heights is None else _known_heights(known_heights, recording)
-    with jax.enable_x64(True):
-        corrected = with_corrected_turns(recording, calibration)
-        drive, grid = drive_arrays(corrected, turns=method != "slope")
-        fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
-        found = elevation_posterior(
-            drive, prior_constants(drive, method, calibration, fixed), method, known, fixed
-        ).series
-        imu_index = imu_of(recording).index
-        t = imu_index.to_numpy(float)
-        columns = ("elevation", "elevation_std", "way", "horizontal", "vertical_speed")
-        estimate = pd.DataFrame({name: np.interp(t, grid, found[name]) for name in columns}, index=imu_index)
-        estimate["valid"] = found["valid"][np.clip(np.searchsorted(grid, t), 0, grid.size - 1)]
+    fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
+    with jax.enable_x64(True), stages(f"elevation of {recording.name} by {method!r}") as stage:
+        stage("readings")
+        drive, grid = drive_arrays(with_corrected_turns(recording, calibration), turns=method != "slope")
+        stage("constants")
+        prior = prior_constants(drive, method, calibration, fixed)
+        stage("elevation")
+        found = elevation_posterior(drive, prior, method, known, fixed).series
+    imu_index = imu_of(recording).index
+    t = imu_index.to_numpy(float)
+    columns = ("elevation", "elevation_std", "way", "horizontal", "vertical_speed")
+    estimate = pd.DataFrame({name: np.interp(t, grid, found[name]) for name in columns}, index=imu_index)
+    estimate["valid"] = found["valid"][np.clip(np.searchsorted(grid, t), 0, grid.size - 1)]
     return estimate
 
 

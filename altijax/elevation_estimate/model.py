@@ -1,63 +1,64 @@
-"""Elevation of a drive as a function of named constants: what the verbs evaluate, calibrate and differentiate."""
+"""Elevation of a drive as a function of named constants: what the verbs evaluate, calibrate and differentiate.
 
+The low pass is linear, so that constants may act behind it as well as before it. Then readings are filtered in NumPy,
+and what is left to compile and to differentiate, arithmetic sample by sample and the integrals, does not see where the
+readings end.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 
-from altijax.altitude import elevation_by_norm, elevation_by_slope, horizontal_distance
-from altijax.calibration.parameters import PARAMETERS
-from altijax.drives import Drive
+from altijax import _safe
+from altijax.altitude import slope_sine, vertical_acceleration
+from altijax.calibration.parameters import ACCEPTED, PARAMETERS
+from altijax.drives import Array, Drive
+from altijax.padding import bucket, padded
 from altijax.rotations import euler_to_matrix
-from altijax.sensors import Accelerometer, correct_accelerometer
-from altijax.signals import cumulative_integral, resample
+from altijax.series import low_pass
+from altijax.signals import cumulative_integral
 
 ELEVATION_METHODS = ("shirai", "slope", "fused")
 
 NOMINAL = {str(name): float(value) for name, value in PARAMETERS["nominal"].dropna().items()}
 UNCERTAINTY = {str(name): float(value) for name, value in PARAMETERS["uncertainty"].items()}
 
+CONSTANTS = tuple(ACCEPTED["fused"])
+"""All that an elevation depends on, whatever its method."""
+
 _FIRST_SECOND = 1.0
+# Of the low pass, in Hz: the paper names none; 1 Hz was best on a real drive.
+_CUTOFF = 1.0
+# The smallest sizes that a grid, and a number of constants to differentiate by, are filled up to.
+_LEAST, _LEAST_NAMES = 16384, 8
 
 
-@partial(jax.jit, static_argnames="method")
-def elevation(values: dict[str, jax.Array], drive: Drive, method: str) -> dict[str, jax.Array]:
-    """Elevation by one of the two ways, its rate, the way and the horizontal distance on the grid.
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class _Readings:
+    """Readings on the grid behind the low pass, filled up at the end."""
+
+    t: Array
+    f: Array  # (3, time)
+    yaw_rate: Array
+    yaw_rate_squared: Array
+    speed: Array  # (raw, smooth and its derivative; time), of the sensor, at the delay that is presumed
+    speed_by_delay: Array  # (the same)
+    first: Array  # which samples are of the first second
+    gravity: Array
+    from_wheel: Array
+
+
+def elevation(values: Mapping[str, float], drive: Drive, method: str) -> dict[str, np.ndarray]:
+    """Elevation by one of the two ways, its rate, and the speed along the road, as read and smooth, on the grid.
 
     "fused" is the slope way here: the two are fused in `elevation_posterior`.
     """
-
-    def value(name: str) -> jax.Array:
-        return jnp.asarray(values.get(name, NOMINAL[name]))
-
-    bias = jnp.stack([value(f"accelerometer_bias_{axis}") for axis in "xyz"])
-    scale = jnp.stack([value(f"accelerometer_scale_{axis}") for axis in "xyz"])
-    f_s = correct_accelerometer(Accelerometer(bias=bias, scale=scale * value("accelerometer_scale")), drive.f)
-    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), value("mounting_pitch"), value("mounting_yaw")]))
-    yaw_rate = drive.yaw_rate - value("yaw_rate_bias")
-    # A sensor ahead of the point that moves along the path is drawn backwards in turns.
-    f_b = (f_s @ mounting.T).at[:, 0].add(value("lever_arm") * yaw_rate**2)
-    delay = jnp.where(drive.from_wheel, value("wheel_delay"), value("gnss_delay"))
-    speed, _ = resample(drive.t + delay, drive.t_speed, drive.speed, jnp.inf)
-    speed = speed * jnp.where(drive.from_wheel, value("wheel_scale"), 1.0)
-    # The car pitches under the same load that the accelerometer reads, on a slope as much as when it speeds up.
-    f_x = f_b[:, 0] / (1 + value("weight_transfer"))
-    height, vertical_speed = elevation_by_slope(drive.t, f_x, speed, drive.gravity)
-    if method == "shirai":
-        first = drive.t <= _FIRST_SECOND
-        way = jnp.sum(jnp.where(first, speed, 0))
-        slope = jnp.sum(jnp.where(first, vertical_speed, 0)) / jnp.where(way > 0, way, 1)
-        initial = values.get("initial_vertical_speed", speed[0] * slope)
-        height, vertical_speed = elevation_by_norm(drive.t, f_b, speed, yaw_rate, drive.gravity, initial)
-    return {
-        "elevation": height,
-        "vertical_speed": vertical_speed,
-        "way": cumulative_integral(drive.t, speed),
-        "horizontal": horizontal_distance(drive.t, speed, vertical_speed),
-        "speed": speed,
-        "valid": drive.supported,
-    }
+    return elevation_and_sensitivity(values, drive, (), method)[0]
 
 
 def uncertain_constants(drive: Drive, method: str) -> dict[str, float]:
@@ -82,15 +83,111 @@ def uncertain_constants(drive: Drive, method: str) -> dict[str, float]:
     return deviation
 
 
-@partial(jax.jit, static_argnames=("names", "method"))
 def elevation_and_sensitivity(
-    values: dict[str, jax.Array], drive: Drive, names: tuple[str, ...], method: str
+    values: Mapping[str, float], drive: Drive, names: Sequence[str], method: str
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Elevation and the rest, and the elevation's derivatives with respect to the named constants (time, names).
+
+    One program serves all drives of about a length and all names of about a number.
+    """
+    if "initial_vertical_speed" in names and "initial_vertical_speed" not in values:
+        # With it held the others' derivatives are not those with it found.
+        values = {**values, "initial_vertical_speed": vertical_speed_at_start(values, drive, names, method)}
+    found, columns = _linearised_at(values, drive, names, method)
+    count = drive.t.shape[0]
+    return {name: x[:count] for name, x in found.items()}, columns[: len(names), :count].T
+
+
+def vertical_speed_at_start(values: Mapping[str, float], drive: Drive, names: Sequence[str], method: str) -> float:
+    """Vertical speed of the first sample as it is found, in m/s; by the program that has these names' derivatives."""
+    return float(_linearised_at(values, drive, names, method)[0]["vertical_speed"][0])
+
+
+def _linearised_at(
+    values: Mapping[str, float], drive: Drive, names: Sequence[str], method: str
+) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    at = {**NOMINAL, "initial_vertical_speed": np.nan, **values}
+    directions = np.eye(len(CONSTANTS))[[CONSTANTS.index(name) for name in names]]
+    with jax.enable_x64(True):
+        return jax.tree.map(
+            np.asarray,
+            _linearised(
+                np.array([at[name] for name in CONSTANTS], float),
+                padded(directions, bucket(len(names), _LEAST_NAMES), 0.0),
+                _readings(drive, at["wheel_delay" if drive.from_wheel else "gnss_delay"]),
+                "slope" if method == "fused" else method,
+            ),
+        )
+
+
+def _readings(drive: Drive, delay: float) -> _Readings:
+    t, count = np.asarray(drive.t), drive.t.shape[0]
+    size = bucket(count, _LEAST)
+    raw = np.stack(_speed_at(t + delay, np.asarray(drive.t_speed), np.asarray(drive.speed)))
+    smooth = low_pass(t, np.vstack([np.transpose(drive.f), drive.yaw_rate, np.square(drive.yaw_rate), raw]), _CUTOFF)
+    speed = np.stack([raw, smooth[5:], np.gradient(smooth[5:], t, axis=-1, edge_order=2)])
+    fill = partial(padded, size=size, axis=-1)
+    return _Readings(
+        t=np.append(t, t[-1] + t[1] * np.arange(1, size - count + 1)),
+        f=fill(smooth[:3]),
+        yaw_rate=fill(smooth[3]),
+        yaw_rate_squared=fill(smooth[4]),
+        speed=fill(speed[:, 0]),
+        speed_by_delay=fill(speed[:, 1]),
+        first=fill(t <= _FIRST_SECOND, fill=False),
+        gravity=drive.gravity,
+        from_wheel=drive.from_wheel,
+    )
+
+
+def _speed_at(t: np.ndarray, t_speed: np.ndarray, speed: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Speed by straight lines between its samples, and its change with time; on a sample that of the line before."""
+    gap = np.diff(t_speed)
+    change = np.append(0.0, np.divide(np.diff(speed), gap, out=np.zeros_like(gap), where=gap > 0))
+    after = np.clip(np.searchsorted(t_speed, t), min(1, gap.size), gap.size)
+    inside = (t >= t_speed[0]) & (t <= t_speed[-1])
+    return np.interp(t, t_speed, speed), np.where(inside, change[after], 0.0)
+
+
+@partial(jax.jit, static_argnames="method")
+def _linearised(
+    x: jax.Array, directions: jax.Array, readings: _Readings, method: str
 ) -> tuple[dict[str, jax.Array], jax.Array]:
-    """Elevation and the rest, and the elevation's derivatives with respect to the named constants (time, names)."""
-    found = elevation(values, drive, method)
-    start = {**NOMINAL, "initial_vertical_speed": found["vertical_speed"][0]} | values
+    """Elevation and the rest for all `CONSTANTS`, and its derivatives (directions, time)."""
 
-    def height(x: jax.Array) -> jax.Array:
-        return elevation(values | dict(zip(names, x, strict=True)), drive, method)["elevation"]
+    def height(x: jax.Array) -> tuple[jax.Array, dict[str, jax.Array]]:
+        found = _elevation(dict(zip(CONSTANTS, x, strict=True)), readings, method)
+        return found["elevation"], found
 
-    return found, jax.jacfwd(height)(jnp.stack([jnp.asarray(start[name]) for name in names]))
+    _, columns, found = jax.vmap(
+        lambda direction: jax.jvp(height, (x,), (direction,), has_aux=True), out_axes=(None, 0, None)
+    )(directions)
+    return found, columns
+
+
+def _elevation(value: dict[str, jax.Array], readings: _Readings, method: str) -> dict[str, jax.Array]:
+    scale = value["accelerometer_scale"] * jnp.stack([value[f"accelerometer_scale_{axis}"] for axis in "xyz"])
+    bias = jnp.stack([value[f"accelerometer_bias_{axis}"] for axis in "xyz"])
+    f_s = readings.f / scale[:, None] - bias[:, None]
+    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), value["mounting_pitch"], value["mounting_yaw"]]))
+    f_x, f_y, f_z = mounting @ f_s
+    # A sensor ahead of the point that moves along the path is drawn backwards in turns.
+    bias = value["yaw_rate_bias"]
+    f_x = f_x + value["lever_arm"] * (readings.yaw_rate_squared - 2 * bias * readings.yaw_rate + bias**2)
+    # The readings are those at the delay itself: what differs from it has a derivative, but is zero.
+    delay = jnp.where(readings.from_wheel, value["wheel_delay"], value["gnss_delay"])
+    later = readings.speed + (delay - jax.lax.stop_gradient(delay)) * readings.speed_by_delay
+    raw_speed, speed, progress = later * jnp.where(readings.from_wheel, value["wheel_scale"], 1.0)
+    # The car pitches under the same load that the accelerometer reads, on a slope as much as when it speeds up.
+    climb = speed * slope_sine(f_x / (1 + value["weight_transfer"]), progress, readings.gravity)
+    if method == "shirai":
+        way = jnp.sum(jnp.where(readings.first, raw_speed, 0))
+        slope = jnp.sum(jnp.where(readings.first, climb, 0)) / jnp.where(way > 0, way, 1)
+        given = value["initial_vertical_speed"]
+        initial = jnp.where(jnp.isnan(given), raw_speed[0] * slope, given)
+        f_norm = _safe.norm(jnp.stack([f_x, f_y, f_z], -1))
+        across = speed * (readings.yaw_rate - bias)
+        vertical = vertical_acceleration(f_norm, progress, across, readings.gravity)
+        climb = initial + cumulative_integral(readings.t, vertical)
+    height = cumulative_integral(readings.t, climb)
+    return {"elevation": height, "vertical_speed": climb, "speed": raw_speed, "smooth_speed": speed}

@@ -8,7 +8,7 @@ import pandas as pd
 from altijax.calibration.parameters import ACCEPTED
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import Drive, imu_of, wheel_pair
-from altijax.elevation_estimate.model import NOMINAL, elevation, uncertain_constants
+from altijax.elevation_estimate.model import NOMINAL, uncertain_constants, vertical_speed_at_start
 from altijax.elevation_estimate.posterior import Constants
 from altijax.recordings import Recording
 
@@ -53,10 +53,9 @@ def prior_constants(
         through = np.vstack([gain, np.eye(len(others))])
         covariance = through @ np.diag(np.square(list(others.values()))) @ through.T
         covariance[: len(names), : len(names)] += own
-    mean = NOMINAL | values
+    mean, order = NOMINAL | values, (*names, *others)
     if "initial_vertical_speed" in others:
-        mean["initial_vertical_speed"] = float(elevation({**values, **fixed}, drive, "shirai")["vertical_speed"][0])
-    order = (*names, *others)
+        mean["initial_vertical_speed"] = vertical_speed_at_start({**values, **fixed}, drive, order, "shirai")
     return Constants(names=order, mean=np.array([mean[name] for name in order]), covariance=covariance)
 
 

@@ -1,12 +1,14 @@
 """The most probable constants, with the noise that the misfit itself shows."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 import pytest
 
-from altijax.calibration.reference_fit import calibration_from, fit_to_reference, weighted_fit
+from altijax.calibration.reference_fit import calibration_from, fit_to_reference, linear_fit, weighted_fit
 
 PRIOR = pd.DataFrame({"nominal": [1.0, 0.0], "uncertainty": [0.5, 2.0], "unit": "m"}, index=["a", "b"])
 T = np.linspace(-1, 1, 400)
@@ -28,6 +30,17 @@ def test_white_noise_is_found_and_the_posterior_is_the_linear_one() -> None:
     information = design.T @ design / found.noise[0] ** 2 + np.eye(2)
     np.testing.assert_allclose(found.covariance, np.linalg.inv(information), rtol=1e-5, atol=1e-12)
     assert np.abs(found.x - [0.3, -1.0]).max() < 4 * np.sqrt(found.covariance.diagonal().max())
+
+
+def test_a_linear_fit_is_the_same_without_a_program() -> None:
+    rng = np.random.default_rng(3)
+    design = np.stack([np.ones_like(T), T], -1)
+    y = design @ [0.3, -1.0] + 0.2 * rng.normal(size=T.size)
+    compiled = fit(y, design)
+    plain = fit_to_reference(partial(linear_fit, [(y[None], -design[None])]), 2, [y[None]])
+    np.testing.assert_allclose(plain.x, compiled.x, atol=1e-9)
+    np.testing.assert_allclose(plain.covariance, compiled.covariance, atol=1e-12)
+    np.testing.assert_allclose(plain.noise, compiled.noise, rtol=1e-9)
 
 
 def test_neighbours_that_go_together_count_as_one() -> None:

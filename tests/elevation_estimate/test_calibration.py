@@ -8,6 +8,7 @@ import pandas as pd
 import pytest
 
 from altijax import estimates
+from altijax.programs import count_programs
 from altijax.recordings import Recording, RecordingWarning, read_recording
 from tests.exact import EXACT, exact_drive
 
@@ -101,6 +102,17 @@ def test_initial_vertical_speed() -> None:
     calibration = estimates.calibrate(moving, ["accelerometer_bias_z", "initial_vertical_speed"], method="shirai")
     again = estimates.estimate_elevation(moving, method="shirai", calibration=calibration, initial_vertical_speed=0.5)
     assert again["vertical_speed"].iloc[0] == pytest.approx(0.5)
+
+
+def test_another_constant_another_end_and_another_length_compile_nothing() -> None:
+    recording = biased(EXACT, ax=0.3)
+    estimates.calibrate(recording, "accelerometer_bias_x", method="slope")
+    shorter = dataclasses.replace(recording, imu=recording.imu.loc[:50.0])
+    with count_programs() as programs:
+        estimates.calibrate(recording, "mounting_pitch", method="slope")
+        estimates.calibrate(recording, "accelerometer_bias_x", method="slope", until=40.0)
+        estimates.calibrate(shorter, "accelerometer_bias_x", method="slope")
+    assert programs.names == []
 
 
 def test_what_cannot_be_told_apart_is_named() -> None:

@@ -11,6 +11,7 @@ import pytest
 from altijax import estimates
 from altijax.constants import STANDARD_GRAVITY
 from altijax.elevation_estimate.model import ELEVATION_METHODS
+from altijax.programs import count_programs
 from tests.exact import EXACT, exact_drive
 
 COLUMNS = ["elevation", "elevation_std", "way", "horizontal", "vertical_speed", "valid"]
@@ -92,6 +93,16 @@ def test_double_precision_whatever_the_flag_says() -> None:
         single = estimates.estimate_elevation(EXACT, method="shirai")
         assert jnp.asarray(1.0).dtype == np.float32
     pd.testing.assert_frame_equal(single, expected)
+
+
+@pytest.mark.parametrize("method", ELEVATION_METHODS)
+def test_recordings_of_half_a_minute_to_a_minute_and_a_half_share_their_programs(method: str) -> None:
+    estimates.estimate_elevation(EXACT, method=method)
+    with count_programs() as programs:
+        for last in (30.0, 41.7, 59.3):
+            cut = {name: getattr(EXACT, name).loc[:last] for name in ("imu", "wheel", "gnss", "reference")}
+            estimates.estimate_elevation(dataclasses.replace(EXACT, **cut), method=method)
+    assert programs.names == []
 
 
 def test_gaps_are_bridged_and_flagged() -> None:
