@@ -25,6 +25,8 @@ _ROUNDS, _FIRST = 4, 0.1
 # No reference and no model is better than this share of what the constants may change.
 _LEAST = 1e-5
 
+# As `levenberg_marquardt` has it.
+_MOST_STEPS = 100
 # The smallest length that residuals are filled up to.
 _LEAST_TIMES = 1024
 
@@ -33,6 +35,7 @@ _together = jax.jit(statistical_inefficiency)
 Residuals = Callable[[jax.Array], tuple[jax.Array, ...]]
 Array = jax.Array | np.ndarray
 Found = tuple[Array, Array, tuple[Array, ...]]
+Linearised = Callable[[np.ndarray], list[tuple[np.ndarray, np.ndarray]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,15 +90,15 @@ def weighted_fit(residuals: Residuals, x0: jax.Array, noise: jax.Array) -> Found
     return fit.x, fit.covariance, residuals(fit.x)
 
 
-def linear_fit(lines: Sequence[tuple[np.ndarray, np.ndarray]], x0: np.ndarray, noise: np.ndarray) -> Found:
-    """The same where the residuals are linear in the unknowns, without a program.
+def stepwise_fit(linearised: Linearised, x0: np.ndarray, noise: np.ndarray) -> Found:
+    """The same by the same steps in NumPy, for residuals whose program, compiled by itself, serves many problems.
 
     Parameters
     ----------
-    lines : sequence of pairs of ndarray
-        For each group the residuals (series, time) of unknowns zero, and their derivatives (series, time, unknowns).
+    linearised : callable
+        For each group the residuals (series, time) of the unknowns, and their derivatives (series, time, unknowns).
     x0 : (unknowns,)
-        Where to begin, which does not matter.
+        Where to begin.
     noise : (groups,)
         Standard deviation of each group.
 
@@ -108,13 +111,32 @@ def linear_fit(lines: Sequence[tuple[np.ndarray, np.ndarray]], x0: np.ndarray, n
     residuals : tuple of arrays
         At the minimum.
     """
-    information, pull = np.eye(x0.size), np.zeros(x0.size)
-    for (constant, slope), std in zip(lines, noise, strict=True):
-        J = slope.reshape(-1, x0.size) / std
-        information += J.T @ J
-        pull -= J.T @ constant.reshape(-1) / std
-    x = np.linalg.solve(information, pull)
-    return x, np.linalg.inv(information), tuple(constant + slope @ x for constant, slope in lines)
+    eps, identity = np.finfo(float).eps, np.eye(x0.size)
+
+    def at(x: np.ndarray) -> tuple[float, np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
+        groups = linearised(x)
+        r = np.concatenate([*(r.reshape(-1) / std for (r, _), std in zip(groups, noise, strict=True)), x])
+        slopes = (J.reshape(-1, x.size) / std for (_, J), std in zip(groups, noise, strict=True))
+        J = np.concatenate([*slopes, identity])
+        return r @ r, J.T @ r, J.T @ J, tuple(r for r, _ in groups)
+
+    x, (cost, gradient, hessian, residuals) = x0, at(x0)
+    damping = 1e-4 * np.max(np.diag(hessian))
+    for _ in range(_MOST_STEPS):
+        step = -np.linalg.solve(hessian + damping * identity, gradient)
+        expected = step @ (damping * step - gradient)
+        if expected <= eps * cost:
+            break
+        tried = at(x + step)
+        if not (np.isfinite(tried[2]).all() and tried[0] <= cost):
+            damping *= 8
+            continue
+        small = np.linalg.norm(step) <= eps**0.5 * (np.linalg.norm(x) + eps**0.5)
+        damping *= np.clip(1 - (2 * (cost - tried[0]) / expected - 1) ** 3, 0.1, 2.0)
+        x, (cost, gradient, hessian, residuals) = x + step, tried
+        if small:
+            break
+    return x, np.linalg.inv(hessian), residuals
 
 
 def fit_to_reference(solve: Callable[[Array, Array], Found], unknowns: int, first: Sequence[Array]) -> ReferenceFit:
@@ -123,7 +145,7 @@ def fit_to_reference(solve: Callable[[Array, Array], Found], unknowns: int, firs
     Parameters
     ----------
     solve : callable
-        What `weighted_fit` or `linear_fit` gives for a problem, by x0 and noise.
+        What `weighted_fit` or `stepwise_fit` gives for a problem, by x0 and noise.
     unknowns : int
         How many.
     first : sequence of arrays

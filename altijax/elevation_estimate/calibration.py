@@ -10,7 +10,7 @@ import pandas as pd
 
 from altijax.calibration.parameters import PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
-from altijax.calibration.reference_fit import ReferenceFit, calibration_from, fit_to_reference, linear_fit
+from altijax.calibration.reference_fit import ReferenceFit, calibration_from, fit_to_reference, stepwise_fit
 from altijax.drives import Drive, drive_arrays, reference_heights, start_of
 from altijax.elevation_estimate.model import (
     NOMINAL,
@@ -24,11 +24,6 @@ from altijax.elevation_estimate.priors import prior_constants
 from altijax.recordings import Recording
 from altijax.series import interpolated
 from altijax.stages import stages
-
-# The elevation is nearly linear in the constants: it takes two or three.
-_MOST_LINEARISATIONS = 20
-# A step of less than this share of a prior's standard deviation is none.
-_NO_STEP = 1e-7
 
 Heights = tuple[np.ndarray, np.ndarray]
 
@@ -123,20 +118,16 @@ def _fit(
     unit: np.ndarray,
     method: str,
 ) -> ReferenceFit:
-    """The constants in units of their priors, by Gauss-Newton steps; a group of residuals a recording."""
-    x, first = np.zeros(len(names)), None
-    for _ in range(_MOST_LINEARISATIONS):
+    """The constants in units of their priors; a group of residuals a recording."""
+
+    def linearised(x: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         values = dict(zip(names, mean + unit * x, strict=True))
-        found = [
-            _linearised(values, drive, target, names, method) for drive, target in zip(drives, targets, strict=True)
-        ]
-        first = [error[None] for error, _ in found] if first is None else first
-        lines = [((error - slope * unit @ x)[None], (slope * unit)[None]) for error, slope in found]
-        fit = fit_to_reference(partial(linear_fit, lines), len(names), first)
-        step, x = np.abs(fit.x - x).max(), fit.x
-        if step < _NO_STEP:
-            break
-    return fit
+        pairs = zip(drives, targets, strict=True)
+        found = [_linearised(values, drive, target, names, method) for drive, target in pairs]
+        return [(error[None], (slope * unit)[None]) for error, slope in found]
+
+    first = [error for error, _ in linearised(np.zeros(len(names)))]
+    return fit_to_reference(partial(stepwise_fit, linearised), len(names), first)
 
 
 def _absorbed(
