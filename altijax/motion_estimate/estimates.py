@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import jax
 import numpy as np
@@ -14,8 +15,15 @@ from altijax.drives import imu_of, start_of
 from altijax.motion_estimate.intervals import MotionReadings
 from altijax.motion_estimate.model import MotionNoise, Trajectory
 from altijax.motion_estimate.readings import motion_readings
-from altijax.motion_estimate.smoother import MotionFit, MotionPrior, motion_between, motion_pass
-from altijax.motion_estimate.start import window_attitudes
+from altijax.motion_estimate.smoother import (
+    MotionBetween,
+    MotionFit,
+    MotionPrior,
+    motion_between,
+    motion_between_by_delay,
+    motion_pass,
+)
+from altijax.motion_estimate.start import quick_jit, window_attitudes
 from altijax.recordings import Recording
 from altijax.stages import Stages, stages
 
@@ -50,6 +58,10 @@ _CLIMB_DELAY_STD = 0.1
 _COURSE_STD = 0.3
 _WINDOW = 15.0  # s
 _WINDOW_WITHOUT_GYRO = 5.0
+
+
+_motion_between, _motion_between_by_delay = quick_jit(motion_between), quick_jit(motion_between_by_delay)
+_motion_pass = quick_jit(motion_pass)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -177,8 +189,8 @@ def _window_estimate(
     window = 1 if method == "epoch" else _odd(length / float(readings.spacing))
     trajectory, attitude, _ = _windows(readings, delay, window, use_gyro)
     stage("between the instants")
-    between = _between(readings, trajectory, delay)
-    instants = between[0]
+    between = jax.device_get(_motion_between(readings, trajectory, np.float64(delay)))
+    instants = between.instants
     covariance = np.zeros((len(attitude), 6, 6))
     covariance[:, :3, :3] = attitude
     noise = replace(_WITH_GYRO if use_gyro else _WITHOUT_GYRO, acceleration=0.3)
@@ -214,7 +226,7 @@ def _found_batch(
         with_wind[[17, 18], [17, 18]] = _WIND_STD**2
         windy = replace(batch, prior=replace(batch.prior, covariance=with_wind))
         windy = _most_probable(readings, windy, stage, estimate_delay=delay is None)
-        vector = windy.fit.trajectory.constants[5:7]
+        vector = np.asarray(windy.fit.trajectory.constants)[5:7]
         error = np.sqrt(np.diag(windy.fit.covariance[-1])[17:19])
         # Ten in the logarithm pays for two more constants many times over; below 1 m/s a wind is a crooked mount, and
         # one in which all courses are the same would let body x point anywhere.
@@ -226,10 +238,13 @@ def _found_batch(
 
 
 def _batch_estimate(recording: Recording, batch: _Batch, readings: MotionReadings) -> pd.DataFrame:
-    trajectory, covariance = batch.fit.trajectory, batch.fit.covariance[:, :6, :6]
-    between = _between(readings, trajectory, batch.delay)
+    trajectory, covariance = batch.fit.trajectory, np.asarray(batch.fit.covariance)[:, :6, :6]
+    # With the derivative, as the passes have it: without it would be another program.
+    between, _ = jax.device_get(_motion_between_by_delay(readings, trajectory, np.float64(batch.delay)))
     estimate = _at_samples(recording, readings, trajectory, between, covariance, batch.noise, batch.delay)
-    estimate.attrs.update(_summary(readings, batch))
+    # Filled up instants count no more than once.
+    distinct = np.append(True, np.diff(between.instants) > 0)
+    estimate.attrs.update(_summary(readings, batch, distinct))
     return estimate
 
 
@@ -299,11 +314,10 @@ def _first_batch(
     best: tuple[_Batch, MotionReadings] | None = None
     for trial in delays:
         readings = motion_readings(recording, use_gyro=use_gyro, delay=trial, longest=longest)
-        prior = MotionPrior(
-            covariance=covariance,
-            doubt=np.ones_like(readings.std),
-            course=np.float64(course),
+        believed: dict[str, Any] = dict(
+            covariance=covariance, doubt=np.ones_like(readings.std), course=np.float64(course)
         )
+        prior = MotionPrior(**believed)
         window = _odd(_WINDOW / float(readings.spacing)) if use_gyro else 1
         start, _, _ = _windows(readings, trial, window, use_gyro)
         for turn in turns:
@@ -356,7 +370,7 @@ def _most_probable(readings: MotionReadings, batch: _Batch, stage: Stages, *, es
         found = minimize(
             _misfit,
             x0,
-            args=(names, nominal, spread, readings, trajectory, prior, noise),
+            args=(names, nominal, spread, jax.device_put(readings), trajectory, prior, noise),
             jac=True,
             method="L-BFGS-B",
             bounds=list(zip(x0 - reach, x0 + reach, strict=True)),
@@ -395,9 +409,10 @@ def _misfit(
 def _pass(
     readings: MotionReadings, trajectory: Trajectory, prior: MotionPrior, noise: MotionNoise, delay: float
 ) -> MotionFit:
-    """`motion_pass` from NumPy to NumPy: an operation on an array of JAX compiles a program of its own."""
+    """`motion_pass` from NumPy to NumPy: an operation on an array of JAX would compile a program of its own."""
     levels = MotionNoise(**{name: np.float64(getattr(noise, name)) for name in _LEVELS})
-    return jax.device_get(motion_pass(readings, trajectory, prior, levels, np.float64(delay)))
+    between = _motion_between_by_delay(readings, trajectory, np.float64(delay))
+    return jax.device_get(_motion_pass(readings, trajectory, prior, levels, *between))
 
 
 def _passes(
@@ -408,6 +423,7 @@ def _passes(
     delay: float,
     passes: int,
 ) -> MotionFit:
+    readings = jax.device_put(readings)
     for _ in range(passes):
         fit = _pass(readings, trajectory, prior, noise, delay)
         trajectory = fit.trajectory
@@ -418,17 +434,14 @@ def _passes(
 
 def _windows(
     readings: MotionReadings, delay: float, window: int, use_gyro: bool
-) -> tuple[Trajectory, np.ndarray, np.ndarray]:
-    prior_std = np.float64(2.0 if use_gyro else _COURSE_STD)
-    return jax.device_get(
-        window_attitudes(readings, np.float64(delay), prior_std, np.int64(window), np.bool_(use_gyro))
-    )
+) -> tuple[Trajectory, np.ndarray, float]:
+    return window_attitudes(readings, delay, 2.0 if use_gyro else _COURSE_STD, window, gyro=use_gyro)
 
 
 def _delay_by_windows(readings: MotionReadings) -> float:
     """Delay at which windows of epochs, turned by the gyro, fit best: the least of a grid and its neighbours."""
     window = _odd(_WINDOW / float(readings.spacing))
-    misfits = np.array([float(_windows(readings, delay, window, True)[2]) for delay in _DELAYS])
+    misfits = np.array([_windows(readings, delay, window, True)[2] for delay in _DELAYS])
     k = int(np.clip(np.argmin(misfits), 1, len(_DELAYS) - 2))
     before, least, after = misfits[k - 1 : k + 2]
     bend = before - 2 * least + after
@@ -448,7 +461,7 @@ def _turns_around(readings: MotionReadings, wind: np.ndarray) -> bool:
     return bool(moving.sum() > 10 and np.linalg.norm(np.mean(v[moving] / speed[moving, None], 0)) < 0.8)
 
 
-def _summary(readings: MotionReadings, batch: _Batch) -> dict[str, object]:
+def _summary(readings: MotionReadings, batch: _Batch, distinct: np.ndarray) -> dict[str, object]:
     there = np.isfinite(readings.std)
     trajectory, constants = batch.fit.trajectory, batch.fit.trajectory.constants
     surprise = batch.fit.surprise[there]
@@ -460,21 +473,17 @@ def _summary(readings: MotionReadings, batch: _Batch) -> dict[str, object]:
         "wind": constants[5:7].tolist() if float(batch.prior.covariance[17, 17]) > 0 else None,
         "climb_delay": float(constants[7]),
         "gyro_scale": (1 / (1 + constants[:3])).tolist(),
-        "accelerometer_bias": trajectory.accelerometer_bias.mean(0).tolist(),
-        "gyro_bias": trajectory.gyro_bias.mean(0).tolist(),
+        "accelerometer_bias": trajectory.accelerometer_bias[distinct].mean(0).tolist(),
+        "gyro_bias": trajectory.gyro_bias[distinct].mean(0).tolist(),
         "objective": batch.objective,
     }
-
-
-def _between(readings: MotionReadings, trajectory: Trajectory, delay: float) -> tuple[np.ndarray, ...]:
-    return jax.device_get(motion_between(readings, trajectory, np.float64(delay)))
 
 
 def _at_samples(
     recording: Recording,
     readings: MotionReadings,
     trajectory: Trajectory,
-    between: tuple[np.ndarray, ...],
+    between: MotionBetween,
     covariance: np.ndarray,
     noise: MotionNoise,
     delay: float,
@@ -482,12 +491,12 @@ def _at_samples(
     """Attitude, velocity and their errors at each IMU sample."""
     imu = imu_of(recording)
     t = imu.index.to_numpy(float) - start_of(recording)
-    instants, ends, C, v, gained = between
-    knots = np.append(instants[0], ends.ravel())
+    instants = between.instants
+    knots = np.append(instants[0], between.t.ravel())
     kept = np.append(True, np.diff(np.maximum.accumulate(knots)) > 1e-9)
     knots = knots[kept]
-    attitudes = np.concatenate([trajectory.C_nb[:1], C.reshape(-1, 3, 3)])[kept]
-    velocities = np.concatenate([trajectory.v_n[:1], v.reshape(-1, 3)])[kept]
+    attitudes = np.concatenate([trajectory.C_nb[:1], between.C_nb.reshape(-1, 3, 3)])[kept]
+    velocities = np.concatenate([trajectory.v_n[:1], between.v_n.reshape(-1, 3)])[kept]
     inside = np.clip(t, knots[0], knots[-1])
     C_nb = Slerp(knots, Rotation.from_matrix(attitudes))(inside).as_matrix()
 
@@ -499,8 +508,8 @@ def _at_samples(
     P = (1 - s)[:, None, None] * P[k] + s[:, None, None] * P[k + 1]
     # Between two known ends a random walk has the variance s (1 - s) dt.
     bridge = s * (1 - s) * dt
-    rotation, acceleration = (float(level) ** 2 for level in (noise.rotation, noise.acceleration))
-    force = np.linalg.norm(gained[np.flatnonzero(distinct)[k]], axis=-1) / dt
+    rotation, acceleration = (float(np.asarray(level)) ** 2 for level in (noise.rotation, noise.acceleration))
+    force = np.linalg.norm(between.gains.velocity[np.flatnonzero(distinct)[k]], axis=-1) / dt
     attitude = P[:, :3, :3] + (rotation * bridge + _AXES_STD**2)[:, None, None] * np.eye(3)
     velocity = np.diagonal(P, axis1=1, axis2=2)[:, 3:6] + (acceleration * bridge)[:, None]
     velocity = velocity + (rotation * bridge * (force * dt) ** 2 / 12)[:, None]

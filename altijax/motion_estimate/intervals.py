@@ -4,11 +4,8 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from altijax.motion_estimate.model import Intervals
-
-Array = jax.Array | np.ndarray
 
 
 @jax.tree_util.register_dataclass
@@ -40,38 +37,42 @@ class MotionReadings:
         Magnitude of gravity.
     """
 
-    t: Array
-    readings: Array
-    sums: Array
-    instant: Array
-    delayed: Array
-    v_gnss: Array
-    std: Array
-    spacing: Array
-    share: Array
-    gravity: Array
+    t: jax.Array
+    readings: jax.Array
+    sums: jax.Array
+    instant: jax.Array
+    delayed: jax.Array
+    v_gnss: jax.Array
+    std: jax.Array
+    spacing: jax.Array
+    share: jax.Array
+    gravity: jax.Array
 
 
 def instants_at(readings: MotionReadings, delay: jax.Array) -> jax.Array:
     """Times of the instants on the IMU's clock, within its span and never backwards."""
     t = jnp.clip(readings.instant - delay * readings.delayed, readings.t[0], readings.t[-1])
     # The latest so far, by its place: JAX differentiates a running maximum by a tree of many copies.
-    fixed = jax.lax.stop_gradient(t)
-    return t[jax.lax.cummax(jnp.where(fixed == jax.lax.cummax(fixed), jnp.arange(t.size), 0))]
+    latest = jax.lax.cummax(jax.lax.stop_gradient(t))
+    return t[jnp.searchsorted(latest, latest)]
 
 
 def intervals_between(readings: MotionReadings, t: jax.Array) -> Intervals:
     """Mean readings over equal steps between instants, exact for readings that run straight between samples."""
-    t_imu, values, total = jnp.asarray(readings.t), jnp.asarray(readings.readings), jnp.asarray(readings.sums)
-    share = jnp.asarray(readings.share)
+    t_imu, share = jnp.asarray(readings.t), jnp.asarray(readings.share)
     duration = jnp.diff(t)
     edges = t[:-1, None] + duration[:, None] * share
     k = jnp.clip(jnp.searchsorted(t_imu, edges, side="right") - 1, 0, t_imu.size - 2)
-    later = edges - t_imu[k]
-    part = (later / (t_imu[k + 1] - t_imu[k]))[..., None]
-    value, rise = values[k], values[k + 1] - values[k]
-    sums = total[k] + later[..., None] * (value + 0.5 * part * rise)
-    lost = total[k, 6] + part[..., 0] * (total[k + 1, 6] - total[k, 6])
+
+    def taken(series: jax.Array, k: jax.Array) -> jax.Array:
+        return jnp.asarray(series).at[k].get(mode="promise_in_bounds", wrap_negative_indices=False)
+
+    later = edges - taken(t_imu, k)
+    part = (later / (taken(t_imu, k + 1) - taken(t_imu, k)))[..., None]
+    value, total = taken(readings.readings, k), taken(readings.sums, k)
+    rise = taken(readings.readings, k + 1) - value
+    sums = total + later[..., None] * (value + 0.5 * part * rise)
+    lost = total[..., 6] + part[..., 0] * (taken(readings.sums, k + 1)[..., 6] - total[..., 6])
     dt = duration[:, None] * jnp.diff(share)
     # A step of no length has the reading of its instant.
     short = ((duration <= 1e-9)[:, None] | (dt <= 0))[..., None]

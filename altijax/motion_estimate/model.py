@@ -200,10 +200,8 @@ def preintegrated_intervals(trajectory: Trajectory, intervals: Intervals) -> tup
     return summed, jnp.einsum("kij,kj->ki", C, turn)
 
 
-def interval_gains(trajectory: Trajectory, intervals: Intervals) -> Gains:
-    """What the readings say of each interval, about a trajectory."""
-    preintegrated, miss = preintegrated_intervals(trajectory, intervals)
-    C = trajectory.C_nb[:-1]
+def interval_gains(C: jax.Array, preintegrated: Preintegrated, miss: jax.Array, intervals: Intervals) -> Gains:
+    """Preintegrated intervals in navigation axes, C the attitude (intervals, 3, 3) at the beginning of each."""
     return Gains(
         velocity=jnp.einsum("kij,kj->ki", C, preintegrated.velocity[:, -1]),
         turn_by_gyro=C @ preintegrated.turn_by_gyro,

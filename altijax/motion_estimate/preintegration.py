@@ -9,16 +9,10 @@ from dataclasses import dataclass
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
 from altijax.rotations import rotvec_to_matrix, skew
-
-# Of the cross product: element i of u x v is the sum of [i, a, b] u_a v_b.
-_CROSS = np.array(
-    [[[0, 0, 0], [0, 0, 1], [0, -1, 0]], [[0, 0, -1], [0, 0, 0], [1, 0, 0]], [[0, 1, 0], [-1, 0, 0], [0, 0, 0]]]
-)
 
 
 @jax.tree_util.register_dataclass
@@ -76,7 +70,7 @@ def relative_attitudes(w_b: ArrayLike, dt: ArrayLike) -> jax.Array:
     steps = rotvec_to_matrix(turns + jnp.cross(before, turns) / 12)
 
     def chain(C: jax.Array, step: jax.Array) -> tuple[jax.Array, jax.Array]:
-        C = _product(C, step)
+        C = C @ step
         return C, C
 
     start = jnp.broadcast_to(jnp.eye(3, dtype=w_b.dtype), (*steps.shape[:-3], 3, 3))
@@ -118,26 +112,24 @@ def preintegrate(f_b: ArrayLike, w_b: ArrayLike, C: ArrayLike, turn: ArrayLike, 
     ends = jnp.cumsum(dt, -1)
     whole = jnp.where(ends[..., -1:] > 0, ends[..., -1:], 1)
     ends, middles = ends / whole, (ends - 0.5 * dt) / whole
-    middle = _product(C, rotvec_to_matrix(-0.5 * dt[..., None] * w_b))
-    middle = _product(rotvec_to_matrix(middles[..., None] * turn[..., None, :]), middle) * dt[..., None, None]
-    gains = jnp.sum(middle * f_b[..., None, :], -1)
+    middle = C @ rotvec_to_matrix(-0.5 * dt[..., None] * w_b)
+    middle = rotvec_to_matrix(middles[..., None] * turn[..., None, :]) @ middle * dt[..., None, None]
+    gains = jnp.einsum("...ij,...j->...i", middle, f_b)
     velocity = jnp.cumsum(gains, -2)
     # What turns the body at the middle of a step turns all the velocity that is gained after it.
     after = velocity[..., -1:, :] - velocity + 0.5 * gains
     by_gyro = jnp.concatenate([middle, -middle * w_b[..., None, :]], -1)
     rows = jnp.concatenate([jnp.ones_like(after[..., :1]), after], -1)
     sums = jnp.einsum("...ta,...tbj->...abj", rows, by_gyro)
-    levered = jnp.sum(_CROSS[..., None] * sums[..., None, 1:, :, :], (-3, -2))
+    # Of the outer products of two vectors, the cross product.
+    outer = sums[..., 1:, :, :]
+    pairs = ((1, 2), (2, 0), (0, 1))
+    levered = jnp.stack([outer[..., a, b, :] - outer[..., b, a, :] for a, b in pairs], -2)
     return Preintegrated(
-        C=_product(rotvec_to_matrix(ends[..., None] * turn[..., None, :]), C),
+        C=rotvec_to_matrix(ends[..., None] * turn[..., None, :]) @ C,
         velocity=velocity,
         turn_by_gyro=-sums[..., 0, :, :],
         velocity_by_gyro=levered,
         velocity_by_bias=-sums[..., 0, :, :3],
         velocity_by_turn=-skew(jnp.sum(middles[..., None] * gains, -2)),
     )
-
-
-def _product(A: jax.Array, B: jax.Array) -> jax.Array:
-    """``A @ B`` as a sum that XLA fuses with what is around it; batches of small matrices cost it a library call."""
-    return jnp.sum(A[..., :, :, None] * B[..., None, :, :], -2)

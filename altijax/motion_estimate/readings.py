@@ -1,5 +1,7 @@
 """From a recording to the arrays of the motion estimators: summed IMU readings, and instants with velocities."""
 
+from typing import Any
+
 import numpy as np
 
 from altijax.drives import gravity_at, imu_of, start_of
@@ -78,7 +80,7 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longe
     # As many steps as resolve the IMU's samples, an even number.
     steps = int(np.ceil(longest / usual / _EVEN)) * _EVEN
     size = bucket(instant.size, _INSTANTS)
-    return MotionReadings(
+    arrays: dict[str, Any] = dict(
         t=t_padded,
         readings=readings,
         sums=sums,
@@ -90,6 +92,7 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longe
         share=np.minimum(np.arange(bucket(steps, _STEPS) + 1) / steps, 1.0),
         gravity=np.float64(gravity_at(recording)),
     )
+    return MotionReadings(**arrays)
 
 
 def _epochs(recording: Recording, start: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -91,66 +91,37 @@ class MotionFit:
     step: jax.Array
 
 
-@jax.jit
-def motion_pass(
-    readings: MotionReadings, trajectory: Trajectory, prior: MotionPrior, noise: MotionNoise, delay: jax.Array
-) -> MotionFit:
-    """One step of Gauss-Newton from a trajectory, and the likelihood about it with its gradient.
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class MotionBetween:
+    """What the readings say between the instants of a trajectory, at one delay of the receiver's stamps.
 
-    Parameters
+    Attributes
     ----------
-    readings : MotionReadings
-        IMU readings and GNSS velocities.
-    trajectory : Trajectory
-        Where to linearise.
-    prior : MotionPrior
-        What is believed beforehand.
-    noise : MotionNoise
-        Noise levels.
-    delay : () s
-        How late the receiver's stamps are.
-
-    Returns
-    -------
-    fit : MotionFit
-        The next trajectory, covariance and likelihood.
+    instants : (time,) s
+        The instants on the IMU's clock.
+    t : (intervals, steps) s
+        Time of the end of each step.
+    C_nb : (intervals, steps, 3, 3)
+        Attitude.
+    v_n : (intervals, steps, 3) m/s
+        Velocity.
+    gains : Gains
+        What each interval as a whole adds to the states.
+    climbing : (time,) m/s^2
+        Vertical acceleration just before each instant.
     """
 
-    def by_time(delay: jax.Array) -> tuple[Gains, jax.Array]:
-        intervals = intervals_between(readings, instants_at(readings, delay))
-        return interval_gains(trajectory, intervals), _climbing(readings, trajectory, intervals)
-
-    # The delay moves every interval at once: one derivative forward through the readings, where one backward would
-    # keep all their steps. What noise levels change is small, and is differentiated backward.
-    timed, timed_by_delay = jax.jvp(by_time, (delay,), (jnp.ones_like(delay),))
-    linear, pull_back = jax.vjp(partial(_linearised, readings, trajectory, prior), noise, timed)
-    filtered = filter_states(**linear)
-    adjoint = adjoint_states(linear["F"], linear["H"], filtered)
-    x, P = smooth_states(filtered, adjoint)
-    gradients = likelihood_gradients(linear["F"], linear["H"], filtered, adjoint)
-    by_noise, by_timed = pull_back(gradients | {"H": jnp.zeros_like(linear["H"])})
-    by_delay = sum(jax.tree.leaves(jax.tree.map(jnp.vdot, by_timed, timed_by_delay)))
-    surprise, doubt = _against_all_others(x, P, linear["z"], linear["R"], prior.doubt, jnp.isfinite(readings.std))
-    turn = _safe.norm(x[:, :3])
-    # Far from the truth a step may be longer than the linear model reaches.
-    shorten = jnp.minimum(1, _LONGEST_TURN / jnp.maximum(turn, 1e-9))
-    return MotionFit(
-        trajectory=moved(trajectory, x.at[:, :3].multiply(shorten[:, None])),
-        covariance=P,
-        log_likelihood=jnp.sum(filtered.log_likelihood),
-        by_noise=by_noise,
-        by_delay=by_delay,
-        doubt=doubt,
-        surprise=surprise,
-        step=jnp.max(turn),
-    )
+    instants: jax.Array
+    t: jax.Array
+    C_nb: jax.Array
+    v_n: jax.Array
+    gains: Gains
+    climbing: jax.Array
 
 
-@jax.jit
-def motion_between(
-    readings: MotionReadings, trajectory: Trajectory, delay: jax.Array
-) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array, jax.Array]:
-    """Attitude and velocity at the steps between the instants of a trajectory.
+def motion_between(readings: MotionReadings, trajectory: Trajectory, delay: jax.Array) -> MotionBetween:
+    """Attitude and velocity at the steps between the instants of a trajectory, and what the readings add up to there.
 
     Readings lead from each instant; by how much they miss the next is spread evenly over the interval, which is the
     mean of a random walk between two known ends.
@@ -166,28 +137,116 @@ def motion_between(
 
     Returns
     -------
-    instants : (time,) s
-        The instants on the IMU's clock.
-    t : (intervals, steps) s
-        Time of the end of each step.
-    C_nb : (intervals, steps, 3, 3)
-        Attitude.
-    v_n : (intervals, steps, 3) m/s
-        Velocity.
-    gained : (intervals, 3) m/s
-        Integral of the specific force over each interval, navigation axes.
+    between : MotionBetween
+        All that depends on the delay.
     """
     instants = instants_at(readings, delay)
     intervals = intervals_between(readings, instants)
-    preintegrated, _ = preintegrated_intervals(trajectory, intervals)
+    preintegrated, miss = preintegrated_intervals(trajectory, intervals)
     share = jnp.asarray(readings.share)[1:]
     later = share * intervals.duration[:, None]
-    C = trajectory.C_nb[:-1, None]
-    gained = jnp.einsum("kij,ktj->kti", trajectory.C_nb[:-1], preintegrated.velocity)
+    C = trajectory.C_nb[:-1]
+    gained = jnp.einsum("kij,ktj->kti", C, preintegrated.velocity)
     v = trajectory.v_n[:-1, None] + gained - later[..., None] * readings.gravity * jnp.array([0.0, 0.0, 1.0])
-    miss = trajectory.v_n[1:] - v[:, -1]
-    v = v + share[:, None] * miss[:, None]
-    return instants, instants[:-1, None] + later, C @ preintegrated.C, v, gained[:, -1]
+    missed = trajectory.v_n[1:] - v[:, -1]
+    return MotionBetween(
+        instants=instants,
+        t=instants[:-1, None] + later,
+        C_nb=C[:, None] @ preintegrated.C,
+        v_n=v + share[:, None] * missed[:, None],
+        gains=interval_gains(C, preintegrated, miss, intervals),
+        climbing=_climbing(readings, trajectory, intervals),
+    )
+
+
+def motion_between_by_delay(
+    readings: MotionReadings, trajectory: Trajectory, delay: jax.Array
+) -> tuple[MotionBetween, tuple[Gains, jax.Array]]:
+    """`motion_between`, and the derivative by the delay of what a pass needs of it.
+
+    The delay moves every interval at once: one derivative forward through the readings, where one backward would keep
+    all their steps.
+
+    Parameters
+    ----------
+    readings : MotionReadings
+        IMU readings.
+    trajectory : Trajectory
+        States at the instants.
+    delay : () s
+        How late the receiver's stamps are.
+
+    Returns
+    -------
+    between : MotionBetween
+        All that depends on the delay.
+    by_delay : Gains, and (time,) m/s^3
+        The derivatives of its gains and of `climbing`, 1/s of each.
+    """
+
+    def timed(delay: jax.Array) -> tuple[tuple[Gains, jax.Array], MotionBetween]:
+        between = motion_between(readings, trajectory, delay)
+        return (between.gains, between.climbing), between
+
+    delay = jnp.asarray(delay)
+    _, by_delay, between = jax.jvp(timed, (delay,), (jnp.ones_like(delay),), has_aux=True)
+    return between, by_delay
+
+
+def motion_pass(
+    readings: MotionReadings,
+    trajectory: Trajectory,
+    prior: MotionPrior,
+    noise: MotionNoise,
+    between: MotionBetween,
+    by_delay: tuple[Gains, jax.Array],
+) -> MotionFit:
+    """One step of Gauss-Newton from a trajectory, and the likelihood about it with its gradient.
+
+    Parameters
+    ----------
+    readings : MotionReadings
+        IMU readings and GNSS velocities.
+    trajectory : Trajectory
+        Where to linearise.
+    prior : MotionPrior
+        What is believed beforehand.
+    noise : MotionNoise
+        Noise levels.
+    between : MotionBetween
+        What the readings say, about the same trajectory.
+    by_delay : Gains, and (time,) m/s^3
+        Derivatives by the delay, as of `motion_between_by_delay`.
+
+    Returns
+    -------
+    fit : MotionFit
+        The next trajectory, covariance and likelihood.
+    """
+    there = jnp.isfinite(readings.std)
+    timed, duration = (between.gains, between.climbing), between.gains.duration
+    linear, pull_back = jax.vjp(partial(_linearised, readings, trajectory, prior), noise, timed)
+    used = jnp.any(there, 1) | (jnp.append(0.0, duration) > 0) | (jnp.append(duration, 0.0) > 0)
+    filtered = filter_states(**linear, used=used)
+    adjoint = adjoint_states(linear["F"], linear["H"], filtered, used)
+    x, P = smooth_states(filtered, adjoint)
+    gradients = likelihood_gradients(linear["F"], linear["H"], filtered, adjoint)
+    by_noise, by_timed = pull_back(gradients | {"H": jnp.zeros_like(linear["H"])})
+    changes = jax.tree.map(jnp.vdot, by_timed, by_delay)
+    surprise, doubt = _against_all_others(x, P, linear["z"], linear["R"], prior.doubt, there)
+    turn = _safe.norm(x[:, :3])
+    # Far from the truth a step may be longer than the linear model reaches.
+    shorten = jnp.minimum(1, _LONGEST_TURN / jnp.maximum(turn, 1e-9))
+    return MotionFit(
+        trajectory=moved(trajectory, x.at[:, :3].multiply(shorten[:, None])),
+        covariance=P,
+        log_likelihood=jnp.sum(filtered.log_likelihood),
+        by_noise=by_noise,
+        by_delay=jnp.sum(jnp.stack(jax.tree.leaves(changes))),
+        doubt=doubt,
+        surprise=surprise,
+        step=jnp.max(turn),
+    )
 
 
 def _linearised(

@@ -1,12 +1,16 @@
 """Attitudes of a record from windows of its epochs: what a whole-record fit starts from, and an estimate of its own."""
 
+from functools import partial
+from typing import Any
+
 import jax
-import jax.numpy as jnp
+import numpy as np
+from scipy.spatial.transform import Rotation
 
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
-from altijax.motion_estimate.model import Trajectory
+from altijax.motion_estimate.model import Intervals, Trajectory
 from altijax.motion_estimate.preintegration import relative_attitudes
-from altijax.rotations import euler_to_matrix, matrix_to_rotvec, rotvec_to_matrix
+from altijax.series import interpolated
 from altijax.wahba import fit_windows
 
 # Error of a mean acceleration over one second, m/s^2: Doppler noise and vibration.
@@ -14,25 +18,37 @@ _ACCELERATION_STD = 0.3
 # Below this speed the direction of travel says nothing, m/s.
 _SLOWEST = 1.0
 
+# XLA's newer way to compile loops for CPUs takes half as long again, for programs that run no faster.
+quick_jit = partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False})
 
-@jax.jit
+_fit_windows = quick_jit(fit_windows)
+
+
+@quick_jit
+def _turned_intervals(readings: MotionReadings, delay: jax.Array) -> tuple[jax.Array, Intervals, jax.Array]:
+    """The instants, the readings between them, and how the gyro turns from the beginning of each interval."""
+    t = instants_at(readings, delay)
+    intervals = intervals_between(readings, t)
+    return t, intervals, relative_attitudes(intervals.w_b, intervals.dt)
+
+
 def window_attitudes(
-    readings: MotionReadings, delay: jax.Array, prior_std: jax.Array, window: jax.Array, gyro: jax.Array
-) -> tuple[Trajectory, jax.Array, jax.Array]:
+    readings: MotionReadings, delay: float, prior_std: float, window: int, *, gyro: bool
+) -> tuple[Trajectory, np.ndarray, float]:
     """Attitude at each instant from the epochs around it, level and along the direction of travel beforehand.
 
     Parameters
     ----------
     readings : MotionReadings
         IMU readings and GNSS velocities.
-    delay : () s
-        How late the receiver's stamps are.
-    prior_std : () rad
-        Standard deviation of the attitude believed beforehand.
-    window : ()
+    delay : float
+        How late the receiver's stamps are, s.
+    prior_std : float
+        Standard deviation of the attitude believed beforehand, rad.
+    window : int
         Epochs that share an attitude, an odd number; 1 for each epoch by itself.
-    gyro : ()
-        True where the attitude turns as the gyro says; False where there is none and the readings of it are zero.
+    gyro : bool
+        Whether the attitude turns as the gyro says; without one the readings of it are zero.
 
     Returns
     -------
@@ -40,83 +56,83 @@ def window_attitudes(
         Attitudes, and the measured velocities joined by straight lines, led on by the readings; biases are zero.
     covariance : (time, 3, 3) rad^2
         Of the attitude, a rotation vector in navigation axes.
-    misfit : ()
+    misfit : float
         Mean square of what the attitudes leave, in units of its variance: least at the right delay.
     """
-    t = instants_at(readings, delay)
-    intervals = intervals_between(readings, t)
-    v = jax.vmap(_joined, in_axes=(None, 1, 1), out_axes=1)(t, readings.v_gnss, readings.std)
-    v_middle = 0.5 * (v[1:] + v[:-1])
+    t, intervals, C = jax.device_get(_turned_intervals(readings, np.float64(delay)))
+    delayed, std = np.asarray(readings.delayed) > 0, np.asarray(readings.std)
+    share, upward = np.asarray(readings.share), np.array([0.0, 0.0, float(readings.gravity)])
+    v = np.zeros_like(std)
+    for axis, known in enumerate(np.isfinite(std).T):
+        if known.any():
+            v[:, axis] = interpolated(t, t[known], np.asarray(readings.v_gnss)[known, axis])
     # Before the first and after the last measured velocity nothing is known of the acceleration.
-    between = (readings.delayed[1:] > 0) & (readings.delayed[:-1] > 0)
-    whole = between & (intervals.duration > 0.3 * readings.spacing)
-    dt = jnp.where(whole, intervals.duration, 1)
-    f_n = jnp.diff(v, axis=0) / dt[:, None] + jnp.array([0.0, 0.0, 1.0]) * readings.gravity
-    std = jnp.where(whole & (intervals.gap == 0), _ACCELERATION_STD / jnp.sqrt(dt), jnp.inf)
+    between = delayed[1:] & delayed[:-1]
+    whole = between & (intervals.duration > 0.3 * float(readings.spacing))
+    dt = np.where(whole, intervals.duration, 1.0)
+    f_n = np.diff(v, axis=0) / dt[:, None] + upward
+    std_n = np.where(whole & (intervals.gap == 0), _ACCELERATION_STD / np.sqrt(dt), np.inf)
 
-    C = relative_attitudes(intervals.w_b, intervals.dt)
-    half = C[:, jnp.argmin(jnp.abs(readings.share[1:] - 0.5))]
-    middles = C @ rotvec_to_matrix(-0.5 * intervals.dt[..., None] * intervals.w_b)
-    mean = jnp.einsum("ktij,ktj,t->ki", middles, intervals.f_b, jnp.diff(readings.share))
-    f_b = jnp.einsum("kji,kj->ki", half, mean)
-    begins = jax.lax.scan(lambda C, by: (C @ by, C), jnp.eye(3, dtype=C.dtype), C[:, -1])[1]
+    half, end = C[:, np.argmin(np.abs(share[1:] - 0.5))], C[:, -1]
+    middles = C @ _matrices(-0.5 * intervals.dt[..., None] * intervals.w_b)
+    mean = np.einsum("ktij,ktj,t->ki", middles, intervals.f_b, np.diff(share), optimize=True)
+    f_b = np.einsum("kji,kj->ki", half, mean)
+    begins = np.empty_like(end)
+    begins[0] = np.eye(3)
+    for k in range(1, len(end)):
+        begins[k] = begins[k - 1] @ end[k - 1]
 
-    level = jnp.zeros_like(dt)
-    C0 = euler_to_matrix(jnp.stack([level, level, _course(v_middle)], -1))
+    C0 = _matrices(np.outer(_course(0.5 * (v[1:] + v[:-1])), [0.0, 0.0, 1.0]))
     # Without a gyro these are attitudes that do not turn.
-    shared = fit_windows(f_b, f_n, C0, jnp.full_like(dt, prior_std), std, window, begins @ half)
-    zero = jnp.zeros_like(v)
-    C_nb = _at_instants(shared.C_nb, half, C[:, -1], intervals.duration, gyro)
+    turned, prior = begins @ half, np.full_like(dt, prior_std)
+    shared = jax.device_get(_fit_windows(f_b, f_n, C0, prior, std_n, np.int64(window), turned))
     # Beyond the measured velocities the readings lead on.
-    gained = jnp.einsum("kij,kj->ki", shared.C_nb, f_b) - jnp.array([0.0, 0.0, 1.0]) * readings.gravity
-    beyond = jnp.cumsum(jnp.where(between[:, None], 0, gained * intervals.duration[:, None]), 0)
-    beyond = jnp.concatenate([zero[:1], beyond])
-    v = v + beyond - beyond[jnp.argmax(jnp.isfinite(readings.std[:, 0]))]
-    trajectory = Trajectory(
+    gained = (np.einsum("kij,kj->ki", shared.C_nb, f_b) - upward) * intervals.duration[:, None]
+    beyond = np.concatenate([np.zeros((1, 3)), np.cumsum(np.where(between[:, None], 0, gained), 0)])
+    zero = np.zeros_like(v)
+    C_nb = _at_instants(shared.C_nb, half, end, intervals.duration, gyro=gyro)
+    # Instants that only fill up stay as the last one is: a pass spends no time on them.
+    last = np.flatnonzero(intervals.duration > 0)[-1] + 1
+    C_nb[last:] = C_nb[last]
+    states: dict[str, Any] = dict(
         C_nb=C_nb,
-        v_n=v,
+        v_n=v + beyond - beyond[np.argmax(np.isfinite(std[:, 0]))],
         accelerometer_bias=zero,
         gyro_bias=zero,
         slip=zero[:, :2],
-        constants=jnp.zeros(8, v.dtype),
+        constants=np.zeros(8),
     )
-    covariance = jnp.concatenate([shared.covariance[:1], shared.covariance])
-    misfit = jnp.sum(whole * shared.misfit**2) / jnp.maximum(jnp.sum(whole), 1)
-    return trajectory, covariance, misfit
+    covariance = np.concatenate([shared.covariance[:1], shared.covariance])
+    misfit = np.sum(whole * shared.misfit**2) / max(np.sum(whole), 1)
+    return Trajectory(**states), covariance, float(misfit)
 
 
 def _at_instants(
-    C_middle: jax.Array, half: jax.Array, whole: jax.Array, duration: jax.Array, gyro: jax.Array
-) -> jax.Array:
+    C_middle: np.ndarray, half: np.ndarray, whole: np.ndarray, duration: np.ndarray, *, gyro: bool
+) -> np.ndarray:
     """Attitudes at the instants from those amid the intervals: carried by the gyro from both sides and averaged.
 
     Without one the attitude turns evenly from the middle of an interval to that of the next.
     """
-    begin = C_middle @ jnp.swapaxes(half, -1, -2)
+    begin = C_middle @ np.swapaxes(half, -1, -2)
     end = begin @ whole
-    ahead, behind = jnp.concatenate([begin, end[-1:]]), jnp.concatenate([begin[:1], end])
-    before, after = jnp.append(duration[:1], duration), jnp.append(duration, duration[-1:])
-    even = jnp.where(before + after > 0, after / jnp.where(before + after > 0, before + after, 1), 0.5)
-    part = jnp.where(gyro, 0.5, even)
-    turn = matrix_to_rotvec(jnp.swapaxes(ahead, -1, -2) @ behind)
-    return ahead @ rotvec_to_matrix(part[:, None] * turn)
+    ahead, behind = np.concatenate([begin, end[-1:]]), np.concatenate([begin[:1], end])
+    before, after = np.append(duration[:1], duration), np.append(duration, duration[-1:])
+    part = np.full(before.size, 0.5)
+    if not gyro:
+        # Where both intervals have no length either share is right.
+        np.divide(after, before + after, out=part, where=before + after > 0)
+    turn = Rotation.from_matrix(np.swapaxes(ahead, -1, -2) @ behind).as_rotvec()
+    return ahead @ _matrices(part[:, None] * turn)
 
 
-def _joined(t: jax.Array, v: jax.Array, std: jax.Array) -> jax.Array:
-    """One component of the measured velocities, joined by straight lines; zero where there is none at all."""
-    there, k, n = jnp.isfinite(std), jnp.arange(t.size), t.size
-    before = jax.lax.cummax(jnp.where(there, k, -1))
-    after = jax.lax.cummin(jnp.where(there, k, n), reverse=True)
-    a = jnp.clip(jnp.where(before < 0, after, before), 0, n - 1)
-    b = jnp.clip(jnp.where(after >= n, before, after), 0, n - 1)
-    span = t[b] - t[a]
-    part = jnp.where(span > 0, (t - t[a]) / jnp.where(span > 0, span, 1), 0)
-    return jnp.where(jnp.any(there), v[a] + part * (v[b] - v[a]), 0)
+def _matrices(rotvec: np.ndarray) -> np.ndarray:
+    return Rotation.from_rotvec(rotvec.reshape(-1, 3)).as_matrix().reshape(*rotvec.shape, 3)
 
 
-def _course(v: jax.Array) -> jax.Array:
+def _course(v: np.ndarray) -> np.ndarray:
     """Direction of travel, counter-clockwise from East, held where it is too slow to tell."""
-    fast = jnp.hypot(v[:, 0], v[:, 1]) > _SLOWEST
-    last = jax.lax.cummax(jnp.where(fast, jnp.arange(len(v)), -1))
-    k = jnp.where(last < 0, jnp.argmax(fast), last)
-    return jnp.arctan2(v[k, 1], v[k, 0])
+    fast = np.hypot(v[:, 0], v[:, 1]) > _SLOWEST
+    last = np.maximum.accumulate(np.where(fast, np.arange(len(v)), -1))
+    k = np.where(last < 0, np.argmax(fast), last)
+    return np.arctan2(v[k, 1], v[k, 0])

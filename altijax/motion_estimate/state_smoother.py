@@ -45,7 +45,15 @@ class Filtered:
 
 
 def filter_states(
-    F: ArrayLike, c: ArrayLike, Q: ArrayLike, z: ArrayLike, H: ArrayLike, R: ArrayLike, x0: ArrayLike, P0: ArrayLike
+    F: ArrayLike,
+    c: ArrayLike,
+    Q: ArrayLike,
+    z: ArrayLike,
+    H: ArrayLike,
+    R: ArrayLike,
+    x0: ArrayLike,
+    P0: ArrayLike,
+    used: ArrayLike | bool = True,
 ) -> Filtered:
     """Run the filter forward.
 
@@ -67,6 +75,9 @@ def filter_states(
         Mean of the state before the first measurement.
     P0 : (states, states)
         Its covariance.
+    used : (time,), optional
+        False where an instant only fills the arrays up: nothing is measured there, nothing changes after it, and no
+        time is spent on it.
 
     Returns
     -------
@@ -101,15 +112,23 @@ def filter_states(
         P_after = P - gain @ cross.T
         return x + gain @ innovation, 0.5 * (P_after + P_after.T), (gain, innovation, precision, log_likelihood)
 
-    def step(state: tuple, inputs: tuple) -> tuple[tuple, tuple]:
+    def advance(state: tuple, inputs: tuple) -> tuple[tuple, tuple]:
         x, P = state
         z, H, R, F, c, Q = inputs
         x_after, P_after, met = update(x, P, z, H, R)
         return (F @ x_after + c, F @ P_after @ F.T + Q), (x, P, *met)
 
-    last, before = jax.lax.scan(step, (x0, P0), (z[:-1], H[:-1], R[:-1], F, c, Q))
-    final = (*last, *update(*last, z[-1], H[-1], R[-1])[2])
-    seen = jax.tree.map(lambda a, b: jnp.concatenate([a, b[None]]), before, final)
+    def rest(state: tuple, inputs: tuple) -> tuple[tuple, tuple]:
+        nothing, none = jnp.zeros((states, rows), x0.dtype), jnp.zeros(rows, x0.dtype)
+        return state, (*state, nothing, none, jnp.eye(rows, dtype=x0.dtype), none[0])
+
+    def step(state: tuple, inputs: tuple) -> tuple[tuple, tuple]:
+        return jax.lax.cond(inputs[0], advance, rest, state, inputs[1:])
+
+    # The last instant too is followed by a transition, which leads nowhere: one loop compiles the update once.
+    F, c, Q = (jnp.concatenate([a, jnp.zeros_like(P0[None] if a.ndim > 2 else x0[None])]) for a in (F, c, Q))
+    used = jnp.broadcast_to(jnp.asarray(used), (intervals + 1,))
+    seen = jax.lax.scan(step, (x0, P0), (used, z, H, R, F, c, Q))[1]
     return Filtered(x=seen[0], P=seen[1], gain=seen[2], innovation=seen[3], precision=seen[4], log_likelihood=seen[5])
 
 
@@ -136,7 +155,7 @@ class Adjoint:
     information_after: jax.Array
 
 
-def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> Adjoint:
+def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered, used: ArrayLike | bool = True) -> Adjoint:
     """Run backward over what `filter_states` found.
 
     Parameters
@@ -147,6 +166,8 @@ def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> Adjoint:
         Derivative of the measurements by the state.
     filtered : Filtered
         What the filter found with the same.
+    used : (time,), optional
+        As of `filter_states`; filling comes after all that is used.
 
     Returns
     -------
@@ -163,7 +184,7 @@ def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> Adjoint:
     H = require_shape("H", H, (F.shape[0] + 1, filtered.innovation.shape[-1], states))
     identity = jnp.eye(states, dtype=filtered.x.dtype)
 
-    def step(later: tuple, inputs: tuple) -> tuple:
+    def advance(later: tuple, inputs: tuple) -> tuple:
         slope, information = later
         F, H, gain, innovation, precision = inputs
         slope_after, information_after = F.T @ slope, F.T @ information @ F
@@ -173,11 +194,15 @@ def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered) -> Adjoint:
         information = 0.5 * (information + information.T)
         return (slope, information), (slope, information, slope_after, information_after)
 
+    def step(later: tuple, inputs: tuple) -> tuple:
+        return jax.lax.cond(inputs[0], advance, lambda later, _: (later, (*later, *later)), later, inputs[1:])
+
     start = jnp.zeros_like(filtered.x[0]), jnp.zeros_like(filtered.P[0])
     after = jnp.concatenate([F, identity[None]])
-    seen = (after, H, filtered.gain, filtered.innovation, filtered.precision)
-    slope, information, slope_after, information_after = jax.lax.scan(step, start, seen, reverse=True)[1]
-    return Adjoint(slope=slope, information=information, slope_after=slope_after, information_after=information_after)
+    used = jnp.broadcast_to(jnp.asarray(used), (len(after),))
+    seen = (used, after, H, filtered.gain, filtered.innovation, filtered.precision)
+    found: tuple[jax.Array, ...] = jax.lax.scan(step, start, seen, reverse=True)[1]
+    return Adjoint(slope=found[0], information=found[1], slope_after=found[2], information_after=found[3])
 
 
 def smooth_states(filtered: Filtered, adjoint: Adjoint) -> tuple[jax.Array, jax.Array]:

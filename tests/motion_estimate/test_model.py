@@ -8,6 +8,7 @@ import pytest
 
 from altijax.motion_estimate.model import (
     STATES,
+    Gains,
     Intervals,
     MotionNoise,
     Trajectory,
@@ -44,6 +45,10 @@ def interval() -> tuple[Trajectory, Intervals]:
     return obeying(trajectory, intervals), intervals
 
 
+def gains(trajectory: Trajectory, intervals: Intervals) -> Gains:
+    return interval_gains(trajectory.C_nb[:-1], *preintegrated_intervals(trajectory, intervals), intervals)
+
+
 def obeying(trajectory: Trajectory, intervals: Intervals) -> Trajectory:
     """The second instant moved to where the readings lead from the first."""
     pre, miss = preintegrated_intervals(trajectory, intervals)
@@ -59,19 +64,19 @@ def obeying(trajectory: Trajectory, intervals: Intervals) -> Trajectory:
 
 def test_a_trajectory_that_obeys_its_readings_misses_nothing() -> None:
     trajectory, intervals = interval()
-    _, c, _ = motion_transitions(trajectory, interval_gains(trajectory, intervals), MotionNoise(), GRAVITY)
+    _, c, _ = motion_transitions(trajectory, gains(trajectory, intervals), MotionNoise(), GRAVITY)
     np.testing.assert_allclose(c, 0, atol=1e-10)
 
 
 def test_transition_carries_small_errors_as_the_motion_does() -> None:
     """Errors of the first instant, led to the second by the readings, arrive there as F says, to second order."""
     trajectory, intervals = interval()
-    F, _, _ = motion_transitions(trajectory, interval_gains(trajectory, intervals), MotionNoise(), GRAVITY)
+    F, _, _ = motion_transitions(trajectory, gains(trajectory, intervals), MotionNoise(), GRAVITY)
     x = 1e-4 * RNG.normal(size=STATES)
     both = jnp.stack([jnp.asarray(x), jnp.asarray(np.r_[np.zeros(6), x[6:]])])
     led = obeying(moved(trajectory, both), intervals)
     ended = replace(led, C_nb=led.C_nb.at[1].set(trajectory.C_nb[1]), v_n=led.v_n.at[1].set(trajectory.v_n[1]))
-    _, c, _ = motion_transitions(ended, interval_gains(ended, intervals), MotionNoise(), GRAVITY)
+    _, c, _ = motion_transitions(ended, gains(ended, intervals), MotionNoise(), GRAVITY)
     expected = (F[0] @ x)[:6]
     np.testing.assert_allclose(led.v_n[1] - trajectory.v_n[1], expected[3:], atol=3e-6)
     np.testing.assert_allclose(c[0, :3], expected[:3], atol=3e-6)

@@ -11,7 +11,7 @@ import pytest
 from altijax.motion_estimate.intervals import MotionReadings, instants_at
 from altijax.motion_estimate.model import MotionNoise, Trajectory
 from altijax.motion_estimate.readings import motion_readings
-from altijax.motion_estimate.smoother import MotionPrior, motion_between, motion_pass
+from altijax.motion_estimate.smoother import MotionFit, MotionPrior, motion_between_by_delay, motion_pass
 from altijax.motion_estimate.start import window_attitudes
 from altijax.recordings import Recording
 from altijax.rotations import euler_to_matrix, matrix_to_rotvec
@@ -48,17 +48,19 @@ def simulated(seed: int) -> tuple[MotionReadings, np.ndarray]:
     return motion_readings(Recording(imu=imu, gnss=gnss), use_gyro=True, delay=0.0), bias
 
 
-@jax.jit
+between, one_pass = jax.jit(motion_between_by_delay), jax.jit(motion_pass)
+
+
 def run(
     readings: MotionReadings,
     trajectory: Trajectory,
     noise: MotionNoise,
     delay: jax.Array,
     doubt: jax.Array | float = 1.0,
-) -> tuple:
+) -> MotionFit:
     doubt = jnp.broadcast_to(jnp.asarray(doubt, readings.std.dtype), readings.std.shape)
     prior = MotionPrior(covariance=jnp.diag(jnp.array(STD) ** 2), doubt=doubt, course=jnp.zeros(()))
-    return motion_pass(readings, trajectory, prior, noise, delay)
+    return one_pass(readings, trajectory, prior, noise, *between(readings, trajectory, delay))
 
 
 def solved(readings: MotionReadings) -> tuple:
@@ -74,7 +76,7 @@ def solved(readings: MotionReadings) -> tuple:
 
 
 def start(readings: MotionReadings) -> tuple:
-    return window_attitudes(readings, np.float64(0.0), np.float64(2.0), np.int64(9), np.bool_(True))
+    return window_attitudes(readings, 0.0, 2.0, 9, gyro=True)
 
 
 @pytest.mark.slow
@@ -147,7 +149,8 @@ def test_an_outlier_is_doubted_and_nothing_else() -> None:
 def test_steps_between_join_the_instants() -> None:
     readings, _ = simulated(3)
     fit, _ = solved(readings)
-    _, t, C, v, _ = motion_between(readings, fit.trajectory, jnp.zeros(()))
+    steps, _ = between(readings, fit.trajectory, jnp.zeros(()))
+    t, C, v = steps.t, steps.C_nb, steps.v_n
     np.testing.assert_allclose(C[:, -1], fit.trajectory.C_nb[1:], atol=1e-10)
     np.testing.assert_allclose(v[:, -1], fit.trajectory.v_n[1:], atol=1e-10)
     assert np.abs(np.asarray(v) - truth(np.asarray(t).ravel())[1].reshape(v.shape)).max() < 0.4

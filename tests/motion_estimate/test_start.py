@@ -22,9 +22,7 @@ def test_what_no_epoch_tells_stays_with_the_course() -> None:
     velocity = np.array([10 * np.cos(2.0), 10 * np.sin(2.0), 0.0])
     gnss = pd.DataFrame(np.tile(velocity, (epochs.size, 1)), columns=["v_e", "v_n", "v_u"], index=epochs)
     readings = motion_readings(Recording(imu=imu, gnss=gnss), use_gyro=False, delay=0.0)
-    trajectory, covariance, misfit = window_attitudes(
-        readings, np.float64(0.0), np.float64(0.3), np.int64(1), np.bool_(False)
-    )
+    trajectory, covariance, misfit = window_attitudes(readings, 0.0, 0.3, 1, gyro=False)
     np.testing.assert_allclose(trajectory.C_nb[5], C, atol=4e-3)
     assert abs(float(covariance[5, 2, 2]) - 0.09) < 0.003
     # What the level prior leaves of a force of 9.8 m/s^2 at a tilt of 0.11 rad.
