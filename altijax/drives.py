@@ -17,13 +17,14 @@ from altijax.series import interpolated, supported
 _PAUSE = 1.0
 # Rows come in bursts where they stand this many times closer than they come on average.
 _BURSTING = 3.0
-# Samples on the grid: 11 hours at 100 Hz, some 5 GiB of memory for an estimate.
+# Samples on the grid: 11 hours at 100 Hz.
 _MOST_SAMPLES = 2**22
+
 Array = jax.Array | np.ndarray
 
 
 @jax.tree_util.register_dataclass
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Drive:
     """A recording's readings for elevation as arrays, times counted from the first IMU sample.
 

@@ -8,6 +8,7 @@ readings end.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from weakref import WeakKeyDictionary
 
 import jax
 import jax.numpy as jnp
@@ -51,6 +52,9 @@ class _Readings:
     first: Array  # which samples are of the first second
     gravity: Array
     from_wheel: Array
+
+
+_KEPT: WeakKeyDictionary[Drive, tuple[float, _Readings]] = WeakKeyDictionary()
 
 
 def elevation(values: Mapping[str, float], drive: Drive, method: str) -> dict[str, np.ndarray]:
@@ -121,6 +125,14 @@ def _linearised_at(
 
 
 def _readings(drive: Drive, delay: float) -> _Readings:
+    """Readings of a drive at a delay of its speed; the last ones are kept while the drive is, for fits ask again."""
+    kept = _KEPT.get(drive)
+    if kept is None or kept[0] != delay:
+        kept = _KEPT[drive] = delay, _filtered(drive, delay)
+    return kept[1]
+
+
+def _filtered(drive: Drive, delay: float) -> _Readings:
     t, count = np.asarray(drive.t), drive.t.shape[0]
     size = bucket(count, _LEAST)
     raw = np.stack(_speed_at(t + delay, np.asarray(drive.t_speed), np.asarray(drive.speed)))
