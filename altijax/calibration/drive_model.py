@@ -24,8 +24,6 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
-from altijax.rotations import euler_to_matrix, rotvec_to_matrix
-
 DRIVE_PARAMETERS = {
     "wheel_scale": (1.0, 0.03, "1"),
     "wheel_delay": (0.0, 0.15, "s"),
@@ -151,15 +149,18 @@ def drive_residuals(parameters: jax.Array, own: jax.Array, stretch: Stretch) -> 
     p = dict(zip(DRIVE_PARAMETERS, parameters, strict=True))
     axes, v_antenna, rolled, still = _motion(p, own, stretch)
     at_epochs = axes @ _at(stretch.t_gnss - p["gnss_delay"], v_antenna) + stretch.noise[2] * own[-3:, None]
-    gnss = (stretch.v_gnss.T - at_epochs) / jnp.repeat(stretch.gnss_std.T, jnp.asarray([2, 1]), 0, total_repeat_length=3)
-    bend = jnp.pad(rolled[:, 2:] - 2 * rolled[:, 1:-1] + rolled[:, :-2], ((0, 0), (1, 1))) / STEP**2
-    rolled, bend = jnp.split(_at(stretch.t_wheel - p["wheel_delay"], jnp.concatenate([rolled, bend])), 2)
-    rolled = rolled + stretch.wheel_spread**2 / 2 * bend
+    gnss = (stretch.v_gnss.T - at_epochs) / jnp.stack([stretch.gnss_std[:, i] for i in (0, 0, 1)])
+    rolled = _at(stretch.t_wheel - p["wheel_delay"], rolled, stretch.wheel_spread)
     # Standing still sideways and upwards holds at any time, whatever the wheels' stamps.
     still = _at(stretch.t_wheel, still)
     shown = p["wheel_scale"] * jnp.stack([stretch.wheel, stretch.apart])
     wheel = jnp.concatenate([shown[:1] - rolled[:1], -still, shown[1:] - rolled[1:]]) / stretch.wheel_std.T
     return jnp.concatenate([gnss.reshape(-1), wheel.reshape(-1)])
+
+
+# Nearly all of a first calibration is the compilation of what follows, with its derivatives. A matrix product, or a sum
+# of products, compiles in a tenth of the time of an element-wise loop, so vectors are turned and crossed by sums, and
+# series are summed, differenced and interpolated by matrices that are mostly zero.
 
 
 def _motion(
@@ -173,31 +174,38 @@ def _motion(
     """
     bias, gyro_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
     one = jnp.ones_like(p["gyro_scale_z"])
-    mounting = euler_to_matrix(jnp.stack([0 * one, p["mounting_pitch"], p["mounting_yaw"]]))
+    yawed, pitched = jnp.asarray([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], one.dtype)
+    yawed, pitched, first_turn = _rotations(
+        jnp.stack([yawed * p["mounting_yaw"], pitched * p["mounting_pitch"], own[:3]])
+    )
+    mounting = yawed @ pitched
     f = mounting @ (stretch.f.T / p["accelerometer_scale"] - bias[:, None])
     w = mounting @ (stretch.w.T / jnp.stack([one, one, p["gyro_scale_z"]])[:, None] - gyro_bias[:, None])
-    axes = rotvec_to_matrix(own[:3]) @ stretch.C_nb @ mounting.T
+    axes = first_turn @ stretch.C_nb @ mounting.T
     turn = w * STEP
     turns = _turns(turn)
+    steps = f.shape[1]
+    node = jnp.arange(steps + 1)
+    t = node.astype(f.dtype) * STEP
     # Constant rate and force in the body during a step: to first order the force is turned by half the step.
     force = _onward(turns, turn, f + _cross(w, f) * STEP / 2)
     # Drifts are so small that they add up as vectors, evenly within each interval.
-    drifts = own[6:-3].reshape(-1, 2, 3) * stretch.noise[:2, None] * (STEP * STEPS_OF_INTERVAL) ** 0.5 @ axes
-    steps = jnp.arange(f.shape[1] + 1, dtype=f.dtype)
-    passed = jnp.clip(steps / STEPS_OF_INTERVAL - jnp.arange(drifts.shape[0], dtype=f.dtype)[:, None], 0, 1)
-    tilt, kicks = drifts[:, 0].T @ passed, drifts[:, 1].T @ passed
-    force = force + _cross((tilt[:, :-1] + tilt[:, 1:]) / 2, force)
-    coasting = (own[3:6] @ axes)[:, None] - (stretch.gravity * axes[2])[:, None] * (STEP * steps)
+    length = STEP * STEPS_OF_INTERVAL
+    drifts = own[6:-3].reshape(-1, 2, 3) * stretch.noise[:2, None] * length**0.5 @ axes
+    passed = jnp.clip(t / length - jnp.arange(drifts.shape[0], dtype=f.dtype)[:, None], 0, 1)
+    tilt_drift, kicks = drifts[:, 0].T, drifts[:, 1].T @ passed
+    force = force + _cross(tilt_drift @ ((passed[:, :-1] + passed[:, 1:]) / 2), force)
+    coasting = jnp.stack([own[3:6] @ axes, -stretch.gravity * axes[2]], -1) @ jnp.stack([jnp.ones_like(t), t])
     v = coasting + _sums(force) * STEP + kicks
-    forward, left, up = _back(turns, turn, v - _cross(tilt, v))
+    forward, left, up = _back(turns, turn, v - _cross(tilt_drift @ passed, v))
     # Rates at the ends of the steps, and by them the velocity of a point one metre ahead of another.
     w = jnp.concatenate([w[:, :1], (w[:, 1:] + w[:, :-1]) / 2, w[:, -1:]], 1)
-    per_metre = jnp.stack([0 * steps, w[2], -w[1]])
+    per_metre = jnp.asarray([[0, 0, 0], [0, 0, 1], [0, -1, 0]], f.dtype) @ w
     v_antenna = v + p["antenna_lever_arm"] * _onward(turns, turn, per_metre)
     left, up = left - p["lever_arm"] * w[2], up + p["lever_arm"] * w[1]
-    nodes = jnp.arange(steps.size)
-    before, after = jnp.maximum(nodes - _LOOK, 0), jnp.minimum(nodes + _LOOK, steps.size - 1)
-    acceleration = (forward[after] - forward[before]) / ((after - before) * STEP)
+    before, after = jnp.maximum(node - _LOOK, 0), jnp.minimum(node + _LOOK, steps)
+    differences = (node[:, None] == after).astype(f.dtype) - (node[:, None] == before)
+    acceleration = forward @ (differences / ((after - before) * STEP))
     squat = p["weight_transfer"] / stretch.gravity * acceleration
     cos, sin = jnp.cos(squat), jnp.sin(squat)
     forward, up = forward * cos - up * sin, forward * sin + up * cos
@@ -216,8 +224,21 @@ def _turns(turn: jax.Array) -> jax.Array:
         return jnp.sum(C[:, :, None] * change, 1), C
 
     first = jnp.eye(3, dtype=turn.dtype)
-    last, before = jax.lax.scan(step, first, rotvec_to_matrix(jax.lax.stop_gradient(turn).T))
+    last, before = jax.lax.scan(step, first, _rotations(jax.lax.stop_gradient(turn).T))
     return jnp.moveaxis(jnp.concatenate([before, last[None]]), 0, -1)
+
+
+def _rotations(rotvecs: jax.Array) -> jax.Array:
+    """`rotvec_to_matrix` of turns well below a revolution, by power series, whose derivatives compile fast."""
+    squared = jnp.sum(rotvecs * rotvecs, -1)[:, None, None]
+    # sin a / a and (1 - cos a) / a^2, to rounding up to half a revolution.
+    sine, versine = jnp.ones_like(squared), jnp.ones_like(squared)
+    for n in range(28, 0, -2):
+        sine, versine = 1 - squared * sine / (n * (n + 1)), 1 - squared * versine / ((n + 1) * (n + 2))
+    versine = versine / 2
+    across = jnp.einsum("ijk,vk->vij", jnp.asarray(_LEVI_CIVITA, rotvecs.dtype), rotvecs)
+    outer = rotvecs[:, :, None] * rotvecs[:, None, :]
+    return (1 - versine * squared) * jnp.eye(3, dtype=rotvecs.dtype) + sine * across + versine * outer
 
 
 @jax.custom_jvp
@@ -228,8 +249,7 @@ def _onward(turns: jax.Array, turn: jax.Array, vectors: jax.Array) -> jax.Array:
     of matrices it would be nine numbers a node and many times the work.
     """
     del turn
-    C = turns[:, :, : vectors.shape[1]]
-    return C[:, 0] * vectors[0] + C[:, 1] * vectors[1] + C[:, 2] * vectors[2]
+    return jnp.sum(turns[:, :, : vectors.shape[1]] * vectors, 1)
 
 
 @_onward.defjvp
@@ -237,27 +257,27 @@ def _onward_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
     turns, turn, vectors = primals
     found = _onward(*primals)
     turned = _turned_more(turns, turn, tangents[1])[:, : vectors.shape[1]]
-    return found, _onward(turns, turn, tangents[2]) + _cross(turned, found)
+    return found, _onward(turns, turn, tangents[2]) - _cross(found, turned)
 
 
 @jax.custom_jvp
 def _back(turns: jax.Array, turn: jax.Array, vectors: jax.Array) -> jax.Array:
     """Components (3, nodes) in the axes of the time, of vectors in the first ones."""
     del turn
-    return turns[0] * vectors[0] + turns[1] * vectors[1] + turns[2] * vectors[2]
+    return jnp.sum(turns * vectors[:, None], 0)
 
 
 @_back.defjvp
 def _back_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
     turns, turn, vectors = primals
     turned = _turned_more(turns, turn, tangents[1])
-    return _back(*primals), _back(turns, turn, tangents[2] - _cross(turned, vectors))
+    return _back(*primals), _back(turns, turn, tangents[2] + _cross(vectors, turned))
 
 
 def _turned_more(turns: jax.Array, turn: jax.Array, change: jax.Array) -> jax.Array:
-    """By how much more (3, nodes) the attitudes are turned, in the first axes, if the steps' rotation vectors change."""
+    """By how much more (3, nodes) the attitudes are turned, in the first axes, where the steps' turns change."""
     squared = jnp.sum(turn * turn, 0)
-    # A step turns by a small angle a: (1 - cos a) / a^2 and (a - sin a) / a^3 by their series.
+    # A step turns by a small angle a: (1 - cos a) / a^2 and (a - sin a) / a^3 by their first terms.
     versine = 1 / 2 - squared / 24 * (1 - squared / 30 * (1 - squared / 56))
     excess = 1 / 6 - squared / 120 * (1 - squared / 42 * (1 - squared / 72))
     across = _cross(turn, change)
@@ -265,23 +285,69 @@ def _turned_more(turns: jax.Array, turn: jax.Array, change: jax.Array) -> jax.Ar
 
 
 def _sums(values: jax.Array) -> jax.Array:
-    """Running sums along the last axis, from zero."""
-    return jnp.pad(jnp.cumsum(values, -1), ((0, 0), (1, 0)))
+    """Running sums along the last axis, from zero: within each interval, then over the intervals before it."""
+    rows, steps = values.shape
+    parts = jnp.pad(values, ((0, 0), (0, -steps % STEPS_OF_INTERVAL))).reshape(rows, -1, STEPS_OF_INTERVAL)
+    within = parts @ jnp.triu(jnp.ones((STEPS_OF_INTERVAL, STEPS_OF_INTERVAL), values.dtype))
+    before = within[:, :, -1] @ jnp.triu(jnp.ones((parts.shape[1], parts.shape[1]), values.dtype), 1)
+    sums = (within + before[:, :, None]).reshape(rows, -1)[:, :steps]
+    return jnp.pad(sums, ((0, 0), (1, 0)))
 
 
+@jax.custom_jvp
 def _cross(a: jax.Array, b: jax.Array) -> jax.Array:
-    return jnp.stack([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return jnp.sum(jnp.einsum("ijk,k...->ij...", jnp.asarray(_LEVI_CIVITA, a.dtype), a) * b, 1)
 
 
-def _at(t: jax.Array, values: jax.Array) -> jax.Array:
-    """Uniform series (rows, nodes) at other times, by Catmull and Rom's cubic.
+@_cross.defjvp
+def _cross_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    (a, b), (da, db) = primals, tangents
+    return _cross(a, b), _cross(a, db) - _cross(b, da)
 
-    Its slope is continuous in the time: else a delay finds a minimum of its own wherever neighbours change.
+
+# times[i][j][k] a[k] b[j], summed over j and k, is component i of a x b.
+_LEVI_CIVITA = (
+    ((0, 0, 0), (0, 0, -1), (0, 1, 0)),
+    ((0, 0, 1), (0, 0, 0), (-1, 0, 0)),
+    ((0, -1, 0), (1, 0, 0), (0, 0, 0)),
+)
+
+
+def _at(t: jax.Array, values: jax.Array, spread: jax.Array | None = None) -> jax.Array:
+    """A uniform series (rows, nodes) at other times, by Catmull and Rom's cubic.
+
+    Its slope is continuous in the time: else a delay finds a minimum of its own wherever neighbours change. `spread` is
+    the standard deviation of the times where it is means about them that are wanted, s.
     """
-    place = jnp.clip(t / STEP, 0, values.shape[1] - 1)
-    i = jnp.clip(jax.lax.stop_gradient(jnp.floor(place)).astype(int), 1, values.shape[1] - 3)
-    x = place - i
-    # Weights of the four neighbours, by powers of the place between the inner two.
-    cubic = jnp.asarray([[0, -1, 2, -1], [2, 0, -5, 3], [0, 1, 4, -3], [0, 0, -1, 1]], values.dtype) / 2
-    weights = cubic @ jnp.stack([jnp.ones_like(x), x, x * x, x * x * x])
-    return jnp.sum(weights * values[:, i + jnp.arange(-1, 3)[:, None]], 1)
+    place = jnp.clip(t / STEP, 1, values.shape[1] - 2)
+    bend = None if spread is None else (spread / STEP) ** 2 / 2
+    return _between(place, values, bend)
+
+
+@jax.custom_jvp
+def _between(place: jax.Array, values: jax.Array, bend: jax.Array | None) -> jax.Array:
+    return values @ _shares(place, bend, values.shape[1])
+
+
+@_between.defjvp
+def _between_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    (place, values, bend), (moved, change, _) = primals, tangents
+    _, slopes = jax.jvp(lambda place: _shares(place, bend, values.shape[1]), (place,), (jnp.ones_like(place),))
+    return _between(*primals), _between(place, change, bend) + moved * (values @ slopes)
+
+
+def _shares(place: jax.Array, bend: jax.Array | None, nodes: int) -> jax.Array:
+    """By how much each node counts at each place (nodes, places)."""
+    away = place - jnp.arange(nodes, dtype=place.dtype)[:, None]
+    shares = _cubic(away)
+    if bend is None:
+        return shares
+    # The mean about a time is the value there and half the variance of the times by the second difference.
+    return shares + bend * (_cubic(away - 1) - 2 * shares + _cubic(away + 1))
+
+
+def _cubic(x: jax.Array) -> jax.Array:
+    """What a node counts at a distance of x steps."""
+    x = jnp.abs(x)
+    near, far = 1 + x * x * (1.5 * x - 2.5), 2 + x * (-4 + x * (2.5 - 0.5 * x))
+    return jnp.where(x < 1, near, jnp.where(x < 2, far, 0))

@@ -6,22 +6,24 @@ less (Huber). A parameter that the drive does not determine keeps its prior and 
 """
 
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from altijax.calibration.drive_model import DRIVE_PARAMETERS, GROUPS, STEP, Stretch, drive_residuals, own_states
 from altijax.calibration.identifiability import Identification, identify_information
 from altijax.calibration.serial_correlation import statistical_inefficiency
 from altijax.calibration.shared_parameters import SharedFit, fit_shared
 from altijax.drives import gravity_at, imu_of, start_of, wheel_pair
+from altijax.padding import bucket, padded
 from altijax.recordings import Recording
-from altijax.rotations import euler_to_matrix
+from altijax.series import means_between
+from altijax.stages import stages
 
 STRETCH = 20.0
 """Length of a stretch, s: long enough for a turn, short enough for the kicks of the IMU's noise to stay few."""
@@ -37,6 +39,9 @@ _FIRST_STD, _LEAST_STD = (0.1, 0.2, 0.05, 0.1, 0.1, 0.1), 0.005
 # Margin of a stretch and bin of the wheel speeds, s.
 _MARGIN, _BIN = 0.5, 0.1
 _TURN_STD, _VELOCITY_STD = 0.5, 5.0
+# What stretches, and epochs and wheel speeds of each, are filled up to, or doubles of it: 192 stretches for an hour,
+# 104 epochs for a receiver of 5 Hz; the wheels' bins are never more.
+_LEAST_STRETCHES, _LEAST_EPOCHS, _LEAST_SAMPLES = 3, 26, round(STRETCH / _BIN) + 1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -103,17 +108,15 @@ def calibrate_drive(
         If a stream is missing, a name is unknown or a drive is shorter than a stretch.
     """
     recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    with jax.enable_x64(True):
-        stretches, starts = zip(*(_of_recording(recording) for recording in recordings), strict=True)
-        all_starts = np.concatenate(starts)
-        fitted = all_starts + STRETCH <= (np.inf if until is None else until)
-        return calibrate_stretches(_stacked(stretches), parameters, fitted=fitted)
+    stretches, starts = zip(*(_of_recording(recording) for recording in recordings), strict=True)
+    fitted = np.concatenate(starts) + STRETCH <= (np.inf if until is None else until)
+    return calibrate_stretches(_stacked(stretches), parameters, fitted=fitted)
 
 
 def calibrate_stretches(
     stretches: Stretch, parameters: Sequence[str] | None = None, *, fitted: np.ndarray | None = None
 ) -> DriveCalibration:
-    """The same from stretches of data, as `drive_stretches` makes them; call it in double precision.
+    """The same from stretches of data, as `drive_stretches` makes them.
 
     Parameters
     ----------
@@ -144,10 +147,20 @@ def calibrate_stretches(
     chosen = np.array([name in names for name in DRIVE_PARAMETERS])
     prior = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
     prior_std = np.where(chosen, [row[1] for row in DRIVE_PARAMETERS.values()], 0.0)
-    fit, noise = _fit_drive(_seen(stretches, fitted), prior, prior_std)
-    rows = np.flatnonzero(chosen)
-    found = identify_information(fit.information[rows][:, rows], jnp.asarray(prior_std[rows]), names=_ordered(names))
-    values = np.asarray(fit.shared)[rows]
+    with jax.enable_x64(True), stages("calibration by driving") as stage:
+        fit, noise = _fit_drive(_seen(stretches, fitted), prior, prior_std, stage)
+        stage("what the drive determines")
+        rows = np.flatnonzero(chosen)
+        found = identify_information(fit.information[np.ix_(rows, rows)], prior_std[rows], names=_ordered(names))
+        sizes = {}
+        if not fitted.all():
+            rest = _with_noise(_seen(stretches, ~fitted), noise / np.asarray(_FIRST_STD))
+            for name, at in (("nominal", prior), ("fitted", fit.shared)):
+                stage(f"stretches that were held out, with {name} values")
+                again = _solve(rest, at, 0 * prior_std, (at, _own0(rest)))
+                left = _by_group(again.residuals, rest)
+                sizes[name] = [float(np.sqrt(np.mean(r[r != 0] ** 2))) if r.any() else np.nan for r in left]
+    values = fit.shared[rows]
     table = pd.DataFrame(
         {
             "value": values,
@@ -161,13 +174,7 @@ def calibrate_stretches(
         index=pd.Index(found.names, name="parameter"),
     )
     held_out = pd.DataFrame()
-    if not fitted.all():
-        rest = _with_noise(_seen(stretches, ~fitted), noise / np.asarray(_FIRST_STD))
-        sizes = {}
-        for name, at in (("nominal", prior), ("fitted", np.asarray(fit.shared))):
-            own = _own0(rest)
-            again = _solve(rest, at, 0 * prior_std, own, _own_std(rest), start=(at, own))
-            sizes[name] = [float(jnp.sqrt(jnp.mean(r[r != 0] ** 2))) for r in _by_group(again.residuals, rest)]
+    if sizes:
         held_out = pd.DataFrame(sizes, index=pd.Index(GROUPS, name="residuals"))
         held_out["worse"] = held_out["fitted"] > held_out["nominal"]
     return DriveCalibration(
@@ -180,16 +187,18 @@ def calibrate_stretches(
     )
 
 
-def _fit_drive(stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray) -> tuple[SharedFit, np.ndarray]:
+def _fit_drive(
+    stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray, stage: Callable[[str], None]
+) -> tuple[SharedFit, np.ndarray]:
     """Fit, noise from its residuals, and fit with that noise; returns this fit and the noise."""
     noise = np.asarray(_FIRST_STD)
-    own, own_std = _own0(stretches), _own_std(stretches)
-    fit = _solve(stretches, prior, prior_std, own, own_std, start=(prior, own))
-    for _ in range(2):
-        factor = np.array([_group_factor(r) for r in _by_group(fit.residuals, stretches)])
-        factor = np.maximum(factor, _LEAST_STD / noise)
+    stage("first fit")
+    fit = _solve(stretches, prior, prior_std, (prior, _own0(stretches)))
+    for number in ("second", "third"):
+        stage(f"noise from what is left, {number} fit")
+        factor = np.maximum(_group_factors(_by_group(fit.residuals, stretches)), _LEAST_STD / noise)
         noise, stretches = noise * factor, _with_noise(stretches, factor)
-        fit = _solve(stretches, prior, prior_std, own, own_std, start=(fit.shared, fit.own))
+        fit = _solve(stretches, prior, prior_std, (fit.shared, fit.own))
     return fit, noise
 
 
@@ -223,7 +232,7 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
     starts = _starts(t)
     # Means over steps, exact for readings that run straight between samples.
     edges = starts[:, None] + STEP * np.arange(steps + 1)
-    f_mean, w_mean = (_means(t, x, edges) for x in (f, w))
+    f_mean, w_mean = (means_between(edges, t, x) for x in (f, w))
     bins = np.unique(np.floor(t_wheel / _BIN), return_inverse=True)[1]
     count = np.bincount(bins)
     t_each, (t_wheel, wheel, apart) = t_wheel, (np.bincount(bins, x) / count for x in (t_wheel, wheel, apart))
@@ -239,24 +248,24 @@ def drive_stretches(recorded: Mapping[str, np.ndarray], gravity: float, noise: M
         for column, shown in ((0, wheel), (3, apart)):
             wheel_std[~np.isfinite(shown[samples]), column] = np.inf
         f_first = f_mean[k, : round(2 / STEP)].mean(0)
-        euler = [np.arctan2(f_first[1], f_first[2]), np.arctan2(f_first[0], np.hypot(*f_first[1:]))]
-        euler.append(np.interp(start, t, heading))
+        roll, pitch = np.arctan2(f_first[1], f_first[2]), np.arctan2(f_first[0], np.hypot(*f_first[1:]))
+        yaw = float(np.interp(start, t, heading))
         gnss_std = np.broadcast_to(_FIRST_STD[:2], (epochs.sum(), 2))
         pieces.append(
             Stretch(
                 f=f_mean[k],
                 w=w_mean[k],
-                C_nb=euler_to_matrix(jnp.asarray(euler)),
-                gravity=jnp.asarray(gravity),
-                noise=jnp.asarray([noise["gyro"] / 2**0.5, noise["accelerometer"] / 2**0.5, noise["receiver"]]),
+                C_nb=Rotation.from_euler("ZYX", [yaw, -pitch, roll]).as_matrix(),
+                gravity=np.asarray(gravity),
+                noise=np.asarray([noise["gyro"] / 2**0.5, noise["accelerometer"] / 2**0.5, noise["receiver"]]),
                 t_gnss=t_gnss[epochs] - start,
                 v_gnss=np.nan_to_num(v_gnss[epochs]),
-                gnss_std=jnp.asarray(np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf)),
+                gnss_std=np.where(np.isfinite(v_gnss[epochs][:, 1:]), gnss_std, np.inf),
                 t_wheel=t_wheel[samples] - start,
                 wheel=np.nan_to_num(wheel[samples]),
                 apart=np.nan_to_num(apart[samples]),
                 wheel_spread=spread[samples],
-                wheel_std=jnp.asarray(wheel_std),
+                wheel_std=wheel_std,
             )
         )
     return _stacked(pieces)
@@ -303,7 +312,39 @@ def _of_recording(recording: Recording) -> tuple[Stretch, np.ndarray]:
     return jax.tree.map(lambda leaf: leaf[whole], stretches), starts[whole] + start
 
 
-_solve = jax.jit(partial(fit_shared, drive_residuals, loss="huber"))
+# One program for all that is fitted and held out.
+_fit = jax.jit(partial(fit_shared, drive_residuals, loss="huber"))
+_together = jax.jit(statistical_inefficiency)
+
+
+def _solve(
+    stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray, start: tuple[np.ndarray, np.ndarray]
+) -> SharedFit:
+    """The fit in NumPy. It runs on stretches filled up with missing observations, and with stretches of them."""
+    count, own = stretches.f.shape[0], _own0(stretches)
+    size = bucket(count, _LEAST_STRETCHES)
+
+    def filled(leaf: np.ndarray) -> np.ndarray:
+        return padded(leaf, size)
+
+    roomy = _with_room(
+        stretches, bucket(stretches.t_gnss.shape[1], _LEAST_EPOCHS), bucket(stretches.t_wheel.shape[1], _LEAST_SAMPLES)
+    )
+    roomy = _seen(jax.tree.map(filled, roomy), np.arange(size) < count)
+    own_std = np.ones(own.shape[1])
+    own_std[:3], own_std[3:6] = _TURN_STD, _VELOCITY_STD
+    found = _fit(roomy, prior, prior_std, filled(own), own_std, start=(start[0], filled(start[1])))
+    fit = jax.tree.map(np.asarray, found)
+    kept = np.concatenate(
+        [
+            np.tile(np.arange(leaf.shape[1]) < there, kinds)
+            for leaf, there, kinds in (
+                (roomy.t_gnss, stretches.t_gnss.shape[1], 3),
+                (roomy.t_wheel, stretches.t_wheel.shape[1], 4),
+            )
+        ]
+    )
+    return replace(fit, own=fit.own[:count], residuals=fit.residuals[:count, kept], weights=fit.weights[:count, kept])
 
 
 def _own0(stretches: Stretch) -> np.ndarray:
@@ -313,30 +354,31 @@ def _own0(stretches: Stretch) -> np.ndarray:
     return own
 
 
-def _own_std(stretches: Stretch) -> np.ndarray:
-    std = np.ones(own_states(stretches.f.shape[1]))
-    std[:3], std[3:6] = _TURN_STD, _VELOCITY_STD
-    return std
-
-
-def _by_group(residuals: jax.Array, stretches: Stretch) -> list[np.ndarray]:
+def _by_group(r: np.ndarray, stretches: Stretch) -> list[np.ndarray]:
     """Residuals of each group (series, time)."""
-    r = np.asarray(residuals)
     epochs, samples = stretches.t_gnss.shape[1], stretches.t_wheel.shape[1]
     gnss = r[:, : 3 * epochs].reshape(-1, 3, epochs)
     wheel = r[:, 3 * epochs :].reshape(-1, 4, samples)
     return [gnss[:, :2].reshape(-1, epochs), gnss[:, 2], *wheel.swapaxes(0, 1)]
 
 
-def _group_factor(r: np.ndarray) -> float:
-    """Root of the robust mean square of residuals times the number of neighbours that count as one."""
-    known = r[r != 0]
-    if known.size < 10:
-        return 1.0
-    size = 1.4826 * float(np.median(np.abs(known)))
-    clipped = np.clip(r, -3 * size, 3 * size)
-    together = np.average(np.asarray(statistical_inefficiency(clipped)), weights=np.sum(clipped**2, 1) + 1e-30)
-    return float(np.sqrt(np.mean(clipped[r != 0] ** 2) * together))
+def _group_factors(groups: list[np.ndarray]) -> np.ndarray:
+    """Root of the robust mean square of residuals times the number of neighbours that count as one, of each group."""
+    # Residuals are at most 3 of their group's robust standard deviations.
+    clipped = []
+    for r in groups:
+        size = 1.4826 * float(np.median(np.abs(r[r != 0]))) if r.any() else 0.0
+        clipped.append(np.clip(r, -3 * size, 3 * size))
+    # All groups in one call, each about its mean and filled up with zeros, which add nothing to products of neighbours.
+    longest = bucket(max(r.shape[1] for r in groups), _LEAST_SAMPLES)
+    rows = np.concatenate([padded(r - r.mean(1, keepdims=True), longest, 0.0, axis=1) for r in clipped])
+    together = np.asarray(_together(padded(rows, bucket(rows.shape[0], 7 * _LEAST_STRETCHES), 0.0)))[: rows.shape[0]]
+    factors = []
+    for raw, r, each in zip(groups, clipped, np.split(together, np.cumsum([len(r) for r in groups])[:-1]), strict=True):
+        known = raw != 0
+        mean = np.average(each, weights=np.sum(r**2, 1) + 1e-30)
+        factors.append(np.sqrt(np.mean(r[known] ** 2) * mean) if known.sum() >= 10 else 1.0)
+    return np.array(factors)
 
 
 def _with_noise(stretches: Stretch, factor: np.ndarray) -> Stretch:
@@ -344,11 +386,11 @@ def _with_noise(stretches: Stretch, factor: np.ndarray) -> Stretch:
 
 
 def _seen(stretches: Stretch, which: np.ndarray) -> Stretch:
-    """The observations of some stretches, the others' missing: cut out, each number of them would compile anew."""
+    """The observations of some stretches, the others' missing."""
     return replace(
         stretches,
-        gnss_std=jnp.where(which[:, None, None], stretches.gnss_std, jnp.inf),
-        wheel_std=jnp.where(which[:, None, None], stretches.wheel_std, jnp.inf),
+        gnss_std=np.where(which[:, None, None], stretches.gnss_std, np.inf),
+        wheel_std=np.where(which[:, None, None], stretches.wheel_std, np.inf),
     )
 
 
@@ -356,18 +398,19 @@ def _stacked(pieces: Iterable[Stretch]) -> Stretch:
     """Stretches stacked, observations filled up to one number with missing ones; or stacks joined."""
     pieces = [p if np.ndim(p.f) == 3 else jax.tree.map(lambda leaf: np.asarray(leaf)[None], p) for p in pieces]
     epochs, samples = (max(getattr(p, name).shape[1] for p in pieces) for name in ("t_gnss", "t_wheel"))
-    room = {"t_gnss": epochs, "v_gnss": epochs, "gnss_std": epochs, "t_wheel": samples, "wheel": samples}
-    room |= {"apart": samples, "wheel_spread": samples, "wheel_std": samples}
+    return jax.tree.map(lambda *leaves: np.concatenate(leaves), *(_with_room(p, epochs, samples) for p in pieces))
 
-    def filled(name: str, values: np.ndarray) -> np.ndarray:
-        if name not in room:
-            return np.asarray(values)
-        ends = [(0, 0), (0, room[name] - values.shape[1])] + [(0, 0)] * (values.ndim - 2)
-        return np.pad(values, ends, constant_values=np.inf if name.endswith("_std") else 0.0)
 
-    names = vars(pieces[0])
-    return Stretch(
-        **{name: jnp.asarray(np.concatenate([filled(name, getattr(p, name)) for p in pieces])) for name in names}
+def _with_room(stretches: Stretch, epochs: int, samples: int) -> Stretch:
+    """The same with so many epochs and wheel speeds in each stretch, those that are new missing."""
+    room = dict.fromkeys(("t_gnss", "v_gnss", "gnss_std"), epochs)
+    room |= dict.fromkeys(("t_wheel", "wheel", "apart", "wheel_spread", "wheel_std"), samples)
+    return replace(
+        stretches,
+        **{
+            name: padded(getattr(stretches, name), size, np.inf if name.endswith("_std") else 0.0, axis=1)
+            for name, size in room.items()
+        },
     )
 
 
@@ -386,13 +429,6 @@ def _starts(t: np.ndarray) -> np.ndarray:
 def _inside(t: np.ndarray, start: float, used_to: float) -> np.ndarray:
     """Observations of a stretch, without its margins and without those of the stretch before."""
     return (t >= max(start + _MARGIN, used_to)) & (t < start + _MARGIN + STRETCH)
-
-
-def _means(t: np.ndarray, x: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Means of series (time, 3) between edges (stretches, steps + 1)."""
-    areas = np.concatenate([np.zeros((1, 3)), np.cumsum(np.diff(t)[:, None] * (x[1:] + x[:-1]) / 2, 0)])
-    at = np.stack([np.interp(edges, t, area) for area in areas.T], -1)
-    return np.diff(at, axis=1) / STEP
 
 
 def _yaw(t: np.ndarray, w: np.ndarray, t_gnss: np.ndarray, v_gnss: np.ndarray) -> np.ndarray:

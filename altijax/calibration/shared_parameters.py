@@ -2,7 +2,8 @@
 
 The most probable values under normal noise and priors, by Gauss-Newton steps with Levenberg's damping in units of the
 priors' standard deviations (plain gradient descent stalls: the Jacobians' condition is 1e4) and bent along the curved
-valleys that biases and tilts form together (geodesic acceleration, Transtrum and Sethna 2012). What belongs to one
+valleys that biases and tilts form together (geodesic acceleration, Transtrum and Sethna 2012: what the residuals bend
+along a step is seen by a look a little way along it, as they do). What belongs to one
 stretch (its initial velocity, an offset, the wandering of its sensors) touches no other stretch, so each step
 eliminates it stretch by stretch (Schur complement) and solves for the few shared parameters. A stretch may as well be a
 whole recording. `levenberg_marquardt`, and optimistix too, would ask for one dense Jacobian of everything by
@@ -13,7 +14,6 @@ other optimiser is needed.
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import jax
@@ -25,8 +25,8 @@ from altijax._shapes import require_shape
 LOSSES = ("squares", "huber", "cauchy")
 # Tuning for 95 % efficiency on normal residuals (Holland and Welsch 1977).
 _HUBER, _CAUCHY = 1.345, 2.385
-# Largest bend of a step against its length (Transtrum and Sethna 2012).
-_MOST_BEND = 0.75
+# Largest bend of a step against its length, and where along the step it is looked for: nearer, rounding would show.
+_MOST_BEND, _LOOK = 0.75, 1e-3
 
 
 @jax.tree_util.register_dataclass
@@ -69,8 +69,8 @@ class SharedFit:
     converged: jax.Array
 
 
-class _Linearised(NamedTuple):
-    """All stretches about one place, by the parameters in units of their priors: shared ones, then own ones."""
+class _Seen(NamedTuple):
+    """All stretches at one place; slopes by the parameters in units of their priors: shared ones, then own ones."""
 
     loss: jax.Array
     residuals: jax.Array
@@ -133,94 +133,98 @@ def fit_shared(
     own_std = require_shape("own_std", own_std, own0.shape[1:])
     terms, states = shared0.size, own_std.size
 
-    def linearised(u: jax.Array, u_own: jax.Array) -> _Linearised:
+    def seen(u: jax.Array, u_own: jax.Array, with_slopes: ArrayLike) -> _Seen:
         shared = shared0 + shared_std * u
 
-        def one(own: jax.Array, stretch: Any) -> _Linearised:
-            # Two passes: what depends on the shared parameters alone is then not differentiated by the many own ones.
-            r, by_shared = _columns(lambda shared: residual(shared, own, stretch), shared, shared_std)
-            _, by_own = _columns(lambda own: residual(shared, own, stretch), own, own_std)
-            J = jnp.concatenate([by_shared, by_own], -1)
+        def one(at: tuple[jax.Array, Any]) -> _Seen:
+            own, stretch = at
+            r, along = _linearised(residual, shared, own, shared_std, own_std, stretch)
             w = _weights(r, loss)
-            weighted = J * w[:, None]
-            return _Linearised(_loss(r, loss), r, w, J.T @ weighted, weighted.T @ r, weighted)
 
-        return jax.vmap(one)(own0 + own_std * u_own, stretches)
+            def slopes() -> tuple[jax.Array, jax.Array, jax.Array]:
+                J = along()
+                weighted = J * w
+                return weighted @ J.T, weighted @ r, weighted
 
-    def cost_of(u: jax.Array, u_own: jax.Array, found: _Linearised) -> jax.Array:
+            none = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(slopes))
+            return _Seen(_loss(r, loss), r, w, *jax.lax.cond(with_slopes, slopes, lambda: none))
+
+        # One stretch after the other: its arrays stay in the processor's cache, and its matrices are no batch.
+        return jax.lax.map(one, (own0 + own_std * u_own, stretches))
+
+    def cost_of(u: jax.Array, u_own: jax.Array, found: _Seen) -> jax.Array:
         return jnp.sum(found.loss) + u @ u + jnp.sum(u_own**2)
 
-    def reduced(found: _Linearised, damping: ArrayLike) -> tuple[jax.Array, Callable]:
-        """Information on the shared parameters with the own ones averaged over, and the step down given slopes."""
-        hessian = found.hessian
-        identity = partial(jnp.eye, dtype=hessian.dtype)
-        block = hessian[:, terms:, terms:] + (1 + damping) * identity(states)
-        across = hessian[:, terms:, :terms]
-        back = jnp.linalg.solve(block, across)
-        information = jnp.sum(hessian[:, :terms, :terms] - jnp.swapaxes(across, 1, 2) @ back, 0)
+    def down(found: _Seen, damping: ArrayLike, slope: jax.Array, own_slope: jax.Array) -> tuple:
+        """The step down given slopes, and the information on the shared parameters with the own ones averaged over."""
+        ridge = 1 + damping
 
-        def down(slope: jax.Array, own_slope: jax.Array) -> tuple[jax.Array, jax.Array]:
-            rest = slope - jnp.einsum("wst,ws->t", back, own_slope)
-            du = -jnp.linalg.solve(information + (1 + damping) * identity(terms), rest)
-            return du, -jnp.linalg.solve(block, own_slope[..., None])[..., 0] - jnp.einsum("wst,t->ws", back, du)
+        def one(at: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+            hessian, own_slope = at
+            across = hessian[terms:, :terms]
+            # All that is asked of a stretch's matrix is solved for at once.
+            known = jnp.linalg.cholesky(hessian[terms:, terms:] + ridge * jnp.eye(states, dtype=hessian.dtype))
+            both = jax.scipy.linalg.cho_solve((known, True), jnp.concatenate([across, own_slope[:, None]], 1))
+            back, own_down = both[:, :terms], both[:, terms]
+            return hessian[:terms, :terms] - across.T @ back, across.T @ own_down, back, own_down
 
-        return information, down
-
-    def bent(u: jax.Array, u_own: jax.Array, found: _Linearised, step: tuple, down: Callable) -> tuple:
-        """The step with its correction of second order, where that is the smaller part."""
-
-        def second(own0: jax.Array, u_own: jax.Array, own_step: jax.Array, stretch: Any) -> jax.Array:
-            def along(s: jax.Array) -> jax.Array:
-                return residual(
-                    shared0 + shared_std * (u + s * step[0]), own0 + own_std * (u_own + s * own_step), stretch
-                )
-
-            zero, one = jnp.zeros_like(u[0]), jnp.ones_like(u[0])
-            return jax.jvp(lambda s: jax.jvp(along, (s,), (one,))[1], (zero,), (one,))[1]
-
-        slopes = jnp.einsum("wot,wo->wt", found.weighted_jacobian, jax.vmap(second)(own0, u_own, step[1], stretches))
-        bend = down(jnp.sum(slopes[:, :terms], 0), slopes[:, terms:])
-        length, bending = (jnp.sqrt(jnp.sum(v[0] ** 2) + jnp.sum(v[1] ** 2)) for v in (step, bend))
-        share = jnp.where(bending <= _MOST_BEND * length, 0.5, 0.0)
-        return step[0] + share * bend[0], step[1] + share * bend[1]
+        information, passed_on, back, own_down = jax.lax.map(one, (found.hessian, own_slope))
+        information = jnp.sum(information, 0)
+        known = jnp.linalg.cholesky(information + ridge * jnp.eye(terms, dtype=information.dtype))
+        du = -jax.scipy.linalg.cho_solve((known, True), slope - jnp.sum(passed_on, 0))
+        return du, -own_down - back @ du, information
 
     def iterate(state: tuple) -> tuple:
-        # Linearised at this one place, which halves the time of compilation: the first trial is the start itself.
-        u, u_own, found, damping, (trial, trial_own), steps, _ = state
-        tried = linearised(trial, trial_own)
+        # Two kinds of visits take turns, to the end of a step and to a place a little way along it, so that the
+        # residuals are compiled once. The first trial is the start itself.
+        u, u_own, found, damping, step, (place, place_own), looking, steps, _ = state
+        visited = seen(place, place_own, ~looking)
         first = steps == 0
-        before, after = cost_of(u, u_own, found), cost_of(trial, trial_own, tried)
-        accepted = first | (after <= before * (1 + 1e-9))  # beyond the start, False for NaN
-        small = (jnp.max(jnp.abs(trial - u)) < 1e-5) | (jnp.abs(before - after) < 1e-7 * before)
-        u, u_own = jnp.where(accepted, trial, u), jnp.where(accepted, trial_own, u_own)
-        found = jax.tree.map(lambda new, old: jnp.where(accepted, new, old), tried, found)
+        before, after = cost_of(u, u_own, found), cost_of(place, place_own, visited)
+        accepted = ~looking & (first | (after <= before * (1 + 1e-9)))  # beyond the start, False for NaN
+        small = (jnp.max(jnp.abs(place - u)) < 1e-5) | (jnp.abs(before - after) < 1e-7 * before)
+        # How the slopes change along the step, beyond what is linear, is twice the bend.
+        whole_step = jnp.concatenate([jnp.broadcast_to(step[0], (u_own.shape[0], terms)), step[1]], 1)
+        linear = found.gradient + _LOOK * jnp.einsum("wij,wj->wi", found.hessian, whole_step)
+        bending = 2 / _LOOK**2 * (jnp.einsum("wto,wo->wt", found.weighted_jacobian, visited.residuals) - linear)
+        u, u_own = jnp.where(accepted, place, u), jnp.where(accepted, place_own, u_own)
+        found = jax.tree.map(lambda new, old: jnp.where(accepted, new, old), visited, found)
         harder = jnp.where(accepted, damping / 5, jnp.maximum(damping, 1e-3) * 3)
-        damping = jnp.where(first, damping, harder)
-        _, down = reduced(found, damping)
-        gradient = found.gradient
-        step = down(jnp.sum(gradient[:, :terms], 0) + u, gradient[:, terms:] + u_own)
-        du, du_own = bent(u, u_own, found, step, down)
-        return u, u_own, found, damping, (u + du, u_own + du_own), steps + 1, ~first & accepted & small
+        damping = jnp.where(first | looking, damping, harder)
+        slopes = jnp.where(looking, bending, found.gradient)
+        prior = jnp.where(looking, 0, 1)
+        *way, _ = down(found, damping, jnp.sum(slopes[:, :terms], 0) + prior * u, slopes[:, terms:] + prior * u_own)
+        length, bend = (jnp.sqrt(jnp.sum(v[0] ** 2) + jnp.sum(v[1] ** 2)) for v in (step, way))
+        share = jnp.where(bend <= _MOST_BEND * length, 0.5, 0.0)
+        step = tuple(jnp.where(looking, old, new) for old, new in zip(step, way, strict=True))
+        place, place_own = (
+            x + jnp.where(looking, whole + share * part, _LOOK * whole)
+            for x, whole, part in zip((u, u_own), step, way, strict=True)
+        )
+        converged = accepted & ~first & small
+        return u, u_own, found, damping, step, (place, place_own), ~looking, steps + ~looking, converged
 
     u, u_own = jnp.zeros_like(shared0), jnp.zeros_like(own0)
+    none = (u, u_own)
     if start is not None:
         free = shared_std > 0
         u = jnp.where(free, (jnp.asarray(start[0]) - shared0) / jnp.where(free, shared_std, 1), 0)
         u_own = (jnp.asarray(start[1]) - own0) / own_std
-    unknown = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(linearised, u, u_own))
-    state = (u, u_own, unknown, jnp.asarray(1e-3, u.dtype), (u, u_own), jnp.asarray(0), jnp.asarray(False))
-    u, u_own, found, _, _, steps, converged = jax.lax.while_loop(
+    unknown = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), jax.eval_shape(seen, u, u_own, True))
+    no, damping = jnp.asarray(False), jnp.asarray(1e-3, u.dtype)
+    state = (u, u_own, unknown, damping, none, (u, u_own), no, jnp.asarray(0), no)
+    u, u_own, found, *_, steps, converged = jax.lax.while_loop(
         lambda state: ~state[-1] & (state[-2] < max_steps), iterate, state
     )
-    information, _ = reduced(found, 0.0)
-    scale = jnp.outer(shared_std, shared_std)
+    *_, information = down(found, 0.0, u, u_own)
+    scale, identity = jnp.outer(shared_std, shared_std), jnp.eye(terms, dtype=u.dtype)
     r, w = found.residuals, found.weights
     observations = jnp.maximum(jnp.sum(r != 0), 1)
     return SharedFit(
         shared=shared0 + shared_std * u,
         own=own0 + own_std * u_own,
         information=information / jnp.where(scale > 0, scale, jnp.inf),
-        covariance=jnp.linalg.inv(information + jnp.eye(terms, dtype=u.dtype)) * scale,
+        covariance=jax.scipy.linalg.cho_solve((jnp.linalg.cholesky(information + identity), True), identity) * scale,
         residuals=r,
         weights=w,
         nis=(jnp.sum(w * r**2) + u @ u + jnp.sum(u_own**2)) / observations,
@@ -266,18 +270,33 @@ def shared_information(
     own = require_shape("own", own, (None, None))
     own_std = require_shape("own_std", own_std, own.shape[1:])
 
-    def one(own: jax.Array, stretch: Any) -> jax.Array:
-        _, A = _columns(lambda shared: residual(shared, own, stretch), shared, jnp.ones_like(shared))
-        _, B = _columns(lambda own: residual(shared, own, stretch), own, own_std)
-        inner = B.T @ B + jnp.eye(own.size, dtype=own.dtype)
-        return A.T @ A - A.T @ B @ jnp.linalg.solve(inner, B.T @ A)
+    def one(at: tuple[jax.Array, Any]) -> jax.Array:
+        own, stretch = at
+        _, along = _linearised(residual, shared, own, jnp.ones_like(shared), own_std, stretch)
+        J = along()
+        A, B = J[: shared.size], J[shared.size :]
+        known = jnp.linalg.cholesky(B @ B.T + jnp.eye(own.size, dtype=own.dtype))
+        return A @ A.T - A @ B.T @ jax.scipy.linalg.cho_solve((known, True), B @ A.T)
 
-    return jnp.sum(jax.vmap(one)(own, stretches), 0)
+    return jnp.sum(jax.lax.map(one, (own, stretches)), 0)
 
 
-def _columns(function: Callable[[jax.Array], jax.Array], x: jax.Array, units: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Value and Jacobian, each column for a change of one parameter by its unit."""
-    return jax.vmap(lambda direction: jax.jvp(function, (x,), (direction,)), out_axes=(None, -1))(jnp.diag(units))
+def _linearised(
+    residual: Callable[[jax.Array, jax.Array, Any], jax.Array],
+    shared: jax.Array,
+    own: jax.Array,
+    shared_unit: jax.Array,
+    own_unit: jax.Array,
+    stretch: Any,
+) -> tuple[jax.Array, Callable[[], jax.Array]]:
+    """Residuals of a stretch, and a function for their slopes (parameters, observations), shared ones first."""
+    r, along = jax.linearize(
+        lambda du, du_own: residual(shared + shared_unit * du, own + own_unit * du_own, stretch),
+        jnp.zeros_like(shared),
+        jnp.zeros_like(own),
+    )
+    directions = jnp.eye(shared.size + own.size, dtype=own.dtype)
+    return r, lambda: jax.vmap(along)(directions[:, : shared.size], directions[:, shared.size :])
 
 
 def _weights(r: jax.Array, loss: str) -> jax.Array:
