@@ -19,8 +19,7 @@ from jax.custom_derivatives import zero_from_primal
 from jax.typing import ArrayLike
 
 from altijax import _safe
-from altijax._epoch_fit import cost as _epoch_cost
-from altijax._epoch_fit import steps as _epoch_steps
+from altijax._epoch_fit import cost as _epoch_cost, steps as _epoch_steps
 from altijax._shapes import require_shape
 from altijax.doppler import velocity_to_course
 from altijax.least_squares import CONVERGED, NOT_FINITE, STEPS_USED_UP

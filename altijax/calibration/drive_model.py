@@ -20,6 +20,7 @@ knows the speed.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -96,19 +97,20 @@ class Stretch:
         Standard deviation of the wheel speed, of standing still sideways and upwards, and of `apart`.
     """
 
-    f: jax.Array
-    w: jax.Array
-    C_nb: jax.Array
-    gravity: jax.Array
-    noise: jax.Array
-    t_gnss: jax.Array
-    v_gnss: jax.Array
-    gnss_std: jax.Array
-    t_wheel: jax.Array
-    wheel: jax.Array
-    apart: jax.Array
-    wheel_spread: jax.Array
-    wheel_std: jax.Array
+    # Arrays of JAX, or of NumPy on their way there.
+    f: Any
+    w: Any
+    C_nb: Any
+    gravity: Any
+    noise: Any
+    t_gnss: Any
+    v_gnss: Any
+    gnss_std: Any
+    t_wheel: Any
+    wheel: Any
+    apart: Any
+    wheel_spread: Any
+    wheel_std: Any
 
 
 def own_states(steps: int) -> int:

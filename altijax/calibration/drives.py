@@ -13,6 +13,7 @@ from functools import partial
 import jax
 import numpy as np
 import pandas as pd
+from jax.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from altijax.calibration.drive_model import DRIVE_PARAMETERS, GROUPS, STEP, Stretch, drive_residuals, own_states
@@ -318,14 +319,14 @@ _together = jax.jit(statistical_inefficiency)
 
 
 def _solve(
-    stretches: Stretch, prior: np.ndarray, prior_std: np.ndarray, start: tuple[np.ndarray, np.ndarray]
+    stretches: Stretch, prior: ArrayLike, prior_std: np.ndarray, start: tuple[ArrayLike, ArrayLike]
 ) -> SharedFit:
     """The fit in NumPy. It runs on stretches filled up with missing observations, and with stretches of them."""
     count, own = stretches.f.shape[0], _own0(stretches)
     size = bucket(count, _LEAST_STRETCHES)
 
-    def filled(leaf: np.ndarray) -> np.ndarray:
-        return padded(leaf, size)
+    def filled(leaf: ArrayLike) -> np.ndarray:
+        return padded(np.asarray(leaf), size)
 
     roomy = _with_room(
         stretches, bucket(stretches.t_gnss.shape[1], _LEAST_EPOCHS), bucket(stretches.t_wheel.shape[1], _LEAST_SAMPLES)
@@ -354,8 +355,9 @@ def _own0(stretches: Stretch) -> np.ndarray:
     return own
 
 
-def _by_group(r: np.ndarray, stretches: Stretch) -> list[np.ndarray]:
+def _by_group(residuals: ArrayLike, stretches: Stretch) -> list[np.ndarray]:
     """Residuals of each group (series, time)."""
+    r = np.asarray(residuals)
     epochs, samples = stretches.t_gnss.shape[1], stretches.t_wheel.shape[1]
     gnss = r[:, : 3 * epochs].reshape(-1, 3, epochs)
     wheel = r[:, 3 * epochs :].reshape(-1, 4, samples)
