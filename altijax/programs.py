@@ -18,7 +18,8 @@ KEPT_PROGRAMS = "ALTIJAX_KEEP_PROGRAMS"
 """Environment variable that keeps programs from the import on: 1 for the user's cache directory, or a folder."""
 
 # JAX locks a cache of bounded size, so that processes do not spoil it for each other; one without a bound it does not.
-_LARGEST = 2 * 2**30
+# It looks at every program kept whenever it adds one, 0.2 s at 8,000 of them: this is room for a few hundred large ones.
+_LARGEST = 256 * 2**20
 COMPILATION = "/jax/core/compile/backend_compile_duration"
 """JAX's name of the event that a program is compiled, or loaded from the kept ones."""
 
@@ -52,7 +53,7 @@ class Programs:
 def keep_programs(folder: str | os.PathLike[str] | None = None) -> Path:
     """Keep compiled programs on disk, for this and all later processes.
 
-    Processes may share the folder, at the same time too. The oldest programs give way beyond 2 GiB.
+    Processes may share the folder, at the same time too. Those used longest ago give way beyond 256 MiB.
 
     Parameters
     ----------

@@ -72,7 +72,7 @@ def test_a_verb_compiles_five_programs_at_most(name: str, recording: Recording) 
 
 
 @pytest.mark.parametrize("name", CALIBRATIONS)
-@pytest.mark.filterwarnings("ignore:.*worse where they were not fitted")
+@pytest.mark.filterwarnings("ignore:.*worse where they were not fitted", "ignore:The data say less of")
 def test_a_calibration_compiles_eight_programs_at_most(name: str, recording: Recording) -> None:
     assert_few(CALIBRATIONS[name], recording, 8)
 
@@ -85,7 +85,7 @@ def test_a_search_compiles_five_programs_at_most(name: str, recording: Recording
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SLOW_CALIBRATIONS)
-@pytest.mark.filterwarnings("ignore:.*worse where they were not fitted")
+@pytest.mark.filterwarnings("ignore:.*worse where they were not fitted", "ignore:The data say less of")
 def test_a_long_calibration_compiles_eight_programs_at_most(name: str, recording: Recording) -> None:
     assert_few(SLOW_CALIBRATIONS[name], recording, 8)
 

@@ -270,15 +270,20 @@ def shared_information(
     own = require_shape("own", own, (None, None))
     own_std = require_shape("own_std", own_std, own.shape[1:])
 
+    # Column by column, so that the information can be differentiated by the drive that is planned.
     def one(at: tuple[jax.Array, Any]) -> jax.Array:
         own, stretch = at
-        _, along = _linearised(residual, shared, own, jnp.ones_like(shared), own_std, stretch)
-        J = along()
-        A, B = J[: shared.size], J[shared.size :]
-        known = jnp.linalg.cholesky(B @ B.T + jnp.eye(own.size, dtype=own.dtype))
-        return A @ A.T - A @ B.T @ jax.scipy.linalg.cho_solve((known, True), B @ A.T)
+        _, A = _columns(lambda shared: residual(shared, own, stretch), shared, jnp.ones_like(shared))
+        _, B = _columns(lambda own: residual(shared, own, stretch), own, own_std)
+        inner = B.T @ B + jnp.eye(own.size, dtype=own.dtype)
+        return A.T @ A - A.T @ B @ jax.scipy.linalg.cho_solve((jnp.linalg.cholesky(inner), True), B.T @ A)
 
     return jnp.sum(jax.lax.map(one, (own, stretches)), 0)
+
+
+def _columns(function: Callable[[jax.Array], jax.Array], x: jax.Array, units: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Value and Jacobian, each column for a change of one parameter by its unit."""
+    return jax.vmap(lambda direction: jax.jvp(function, (x,), (direction,)), out_axes=(None, -1))(jnp.diag(units))
 
 
 def _linearised(

@@ -226,7 +226,9 @@ def motion_pass(
     there = jnp.isfinite(readings.std)
     timed, duration = (between.gains, between.climbing), between.gains.duration
     linear, pull_back = jax.vjp(partial(_linearised, readings, trajectory, prior), noise, timed)
-    used = jnp.any(there, 1) | (jnp.append(0.0, duration) > 0) | (jnp.append(duration, 0.0) > 0)
+    lasts = jnp.any(there, 1) | (jnp.append(0.0, duration) > 0) | (jnp.append(duration, 0.0) > 0)
+    # Filling comes last: a first instant that the delay has moved onto the next one is none.
+    used = jax.lax.cummax(lasts.astype(int), reverse=True) > 0
     filtered = filter_states(**linear, used=used)
     adjoint = adjoint_states(linear["F"], linear["H"], filtered, used)
     x, P = smooth_states(filtered, adjoint)
