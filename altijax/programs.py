@@ -18,7 +18,7 @@ KEPT_PROGRAMS = "ALTIJAX_KEEP_PROGRAMS"
 """Environment variable that keeps programs from the import on: 1 for the user's cache directory, or a folder."""
 
 # JAX locks a cache of bounded size, so that processes do not spoil it for each other; one without a bound it does not.
-# It looks at every program kept whenever it adds one, 0.2 s at 8,000 of them: there is room for some hundred large ones.
+# It looks at every program kept whenever it adds one, 0.2 s at 8,000 of them: there is room for hundreds of large ones.
 _LARGEST = 256 * 2**20
 COMPILATION = "/jax/core/compile/backend_compile_duration"
 """JAX's name of the event that a program is compiled, or loaded from the kept ones."""

@@ -1,6 +1,7 @@
 """Signs of life: what a long piece of work is doing, shown once it has taken two seconds, and written to the log."""
 
 import logging
+import os
 import threading
 import time
 from collections.abc import Iterator, Sequence
@@ -84,6 +85,23 @@ class _Bar:
                 self._shown.set_description_str(self._stage + self._compiling)
 
 
+class _Forks:
+    """Whether this process was forked from one in which JAX ran, whose threads it lacks."""
+
+    def __init__(self) -> None:
+        self._watched, self.happened = False, False
+
+    def watch(self) -> None:
+        """From now on JAX runs, and a process forked from this one is lost to it."""
+        if not self._watched and hasattr(os, "register_at_fork"):
+            os.register_at_fork(after_in_child=self._note)
+        self._watched = True
+
+    def _note(self) -> None:
+        self.happened = True
+
+
+_FORKS = _Forks()
 _BAR: ContextVar[_Bar | None] = ContextVar("altijax_bar", default=None)
 
 
@@ -102,7 +120,18 @@ def stages(title: str, total: int | None = None) -> Iterator[Stages]:
     ------
     stage : callable
         ``stage("noise levels")`` says which stage begins, ``stage.advance()`` that one of the items is done.
+
+    Raises
+    ------
+    RuntimeError
+        In a process that was forked after JAX had run: it would wait for ever.
     """
+    if _FORKS.happened:
+        raise RuntimeError(
+            "this process was forked after an estimate had run, and JAX cannot go on in it: start worker processes by "
+            'multiprocessing.get_context("spawn"), or use threads'
+        )
+    _FORKS.watch()
     outer = _BAR.get()
     if outer is not None:
         yield Stages(title, total, outer)

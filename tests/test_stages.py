@@ -2,6 +2,8 @@
 
 import io
 import logging
+import os
+import subprocess
 import sys
 import time
 
@@ -52,6 +54,27 @@ def test_the_log_tells_programs_and_seconds(caplog: pytest.LogCaptureFixture) ->
         jax.jit(lambda x: jnp.cos(x) + 19.0)(jnp.ones(11))
     assert len(caplog.messages) == 1 and caplog.messages[0].startswith("work: ")
     assert "program(s) compiled" in caplog.messages[0]
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system does not fork")
+def test_a_forked_process_says_why_it_cannot_go_on() -> None:
+    code = """
+import os, warnings
+warnings.simplefilter("ignore")
+from altijax.stages import stages
+with stages("before"):
+    pass
+child = os.fork()
+if child == 0:
+    try:
+        with stages("in the child"):
+            pass
+    except RuntimeError as error:
+        os._exit(17 if "spawn" in str(error) else 1)
+    os._exit(2)
+raise SystemExit(os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 17
 
 
 def test_what_fails_leaves_nothing_behind() -> None:
