@@ -10,7 +10,6 @@ from dataclasses import replace
 from functools import partial
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
@@ -146,14 +145,14 @@ def _fit(motions: Sequence[Motion], references: Sequence[pd.DataFrame], names: l
         slopes = [
             np.stack([(plus[k] - minus[k]) / (2 * _DIFFERENCE) for plus, minus in pairs], -1) for k in range(len(here))
         ]
-        data = [(jnp.asarray(r - slope @ at), jnp.asarray(slope)) for r, slope in zip(here, slopes, strict=True)]
-        fit = fit_to_reference(partial(_solve, data=data), len(names), [jnp.asarray(r) for r in first])
+        data = [(r - slope @ at, slope) for r, slope in zip(here, slopes, strict=True)]
+        fit = fit_to_reference(partial(_solve, data=data), len(names), first)
         at = fit.x
     return fit
 
 
 @jax.jit
-def _solve(x0: jax.Array, noise: jax.Array, data: list[tuple[jax.Array, jax.Array]]) -> Found:
+def _solve(x0: jax.Array, noise: jax.Array, data: list[tuple[np.ndarray, np.ndarray]]) -> Found:
     return weighted_fit(lambda x: tuple(constant + slope @ x for constant, slope in data), x0, noise)
 
 
