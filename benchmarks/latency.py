@@ -11,8 +11,8 @@ its own; seconds are user and system time of all threads, after the import, with
     kept      like first, in a second process where `keep_programs` is on
     ratio     first, to that of the older commit, measured just before
 
-Before any time the results of both commits are held against each other: they may differ by rounding, and in `batch`
-and the calibrations by what their searches make of it.
+Before any time the results of both commits are held against each other: they may differ by rounding, and in `batch`,
+the speed filter and the calibrations by what their searches make of it.
 """
 
 import json
@@ -120,7 +120,7 @@ print(json.dumps(rows))
 def in_a_process(tree: Path, name: str, result: str, kept: Path | None = None) -> dict:
     """What a fresh process that imports altijax from a tree measured."""
     env = {key: value for key, value in os.environ.items() if key != "ALTIJAX_KEEP_PROGRAMS"}
-    env |= {"PYTHONPATH": str(tree)} | ({} if kept is None else {"ALTIJAX_KEEP_PROGRAMS": str(kept)})
+    env |= {"PYTHONPATH": str(tree), "TQDM_DISABLE": "1"} | ({} if kept is None else {"ALTIJAX_KEEP_PROGRAMS": str(kept)})
     run = subprocess.run(
         [sys.executable, "-c", MEASURED, name, result], env=env, cwd=tree, stdout=subprocess.PIPE, text=True, check=True
     )
@@ -139,7 +139,7 @@ def assert_equal(name: str, ours: Path, theirs: Path) -> None:
         if column == "heading":
             apart = np.mod(apart + np.pi, 2 * np.pi) - np.pi
         bar = column if column.endswith("_std") else f"{column}_std"
-        limit = MOVED * old[bar].mean() if name.startswith("motion batch") else SAME
+        limit = MOVED * old[bar].mean() if name.startswith(("motion batch", "speed filter")) else SAME
         assert np.abs(apart).max() < limit, f"{name}: {column} moved by {np.abs(apart).max():.3g}"
 
 
