@@ -120,7 +120,8 @@ print(json.dumps(rows))
 def in_a_process(tree: Path, name: str, result: str, kept: Path | None = None) -> dict:
     """What a fresh process that imports altijax from a tree measured."""
     env = {key: value for key, value in os.environ.items() if key != "ALTIJAX_KEEP_PROGRAMS"}
-    env |= {"PYTHONPATH": str(tree), "TQDM_DISABLE": "1"} | ({} if kept is None else {"ALTIJAX_KEEP_PROGRAMS": str(kept)})
+    env |= {"PYTHONPATH": str(tree), "TQDM_DISABLE": "1"}
+    env |= {} if kept is None else {"ALTIJAX_KEEP_PROGRAMS": str(kept)}
     run = subprocess.run(
         [sys.executable, "-c", MEASURED, name, result], env=env, cwd=tree, stdout=subprocess.PIPE, text=True, check=True
     )
