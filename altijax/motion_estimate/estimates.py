@@ -23,7 +23,7 @@ from altijax.motion_estimate.smoother import (
     motion_between_by_delay,
     motion_pass,
 )
-from altijax.motion_estimate.start import quick_jit, window_attitudes
+from altijax.motion_estimate.start import delay_by_windows, epochs_within, quick_jit, window_attitudes
 from altijax.recordings import Recording
 from altijax.stages import Stages, stages
 
@@ -39,7 +39,6 @@ _WITHOUT_GYRO = MotionNoise(rotation=0.1, gyro_walk=0.1)
 _SPREAD, _WALK_SPREAD = 1.5, 1.0
 # Delays of receivers, s.
 _DELAY, _DELAY_STD = 0.1, 0.3
-_DELAYS = np.arange(-0.2, 1.05, 0.1)
 _DELAYS_WITHOUT_GYRO = (0.05, 0.35, 0.65)
 # Standard deviations before anything is known: attitude and velocity can be anything.
 _ATTITUDE_STD, _VELOCITY_STD = 2.0, 100.0
@@ -181,12 +180,12 @@ def _window_estimate(
     readings = motion_readings(recording, use_gyro=use_gyro, delay=first)
     if search:
         stage("delay of the GNSS velocities")
-        delay = _delay_by_windows(readings)
+        delay = delay_by_windows(readings)
         readings = motion_readings(recording, use_gyro=use_gyro, delay=delay)
     delay = float(delay or 0.0)
     stage("attitudes by windows of epochs")
     length = {False: _WINDOW_WITHOUT_GYRO, True: _WINDOW}[use_gyro]
-    window = 1 if method == "epoch" else _odd(length / float(readings.spacing))
+    window = 1 if method == "epoch" else epochs_within(length / float(readings.spacing))
     trajectory, attitude, _ = _windows(readings, delay, window, use_gyro)
     stage("between the instants")
     between = jax.device_get(_motion_between(readings, trajectory, np.float64(delay)))
@@ -217,7 +216,7 @@ def _found_batch(
     first = delay if delay is not None else _DELAY if beliefs.delay is None else beliefs.delay[0]
     if delay is None and use_gyro and beliefs.delay is None:
         stage("delay of the GNSS velocities")
-        first = _delay_by_windows(motion_readings(recording, use_gyro=use_gyro, delay=first))
+        first = delay_by_windows(motion_readings(recording, use_gyro=use_gyro, delay=first))
     stage("first trajectory")
     batch, readings = _first_batch(recording, use_gyro, wind, delay, first, beliefs)
     batch = _most_probable(readings, batch, stage, estimate_delay=delay is None)
@@ -318,7 +317,7 @@ def _first_batch(
             covariance=covariance, doubt=np.ones_like(readings.std), course=np.float64(course)
         )
         prior = MotionPrior(**believed)
-        window = _odd(_WINDOW / float(readings.spacing)) if use_gyro else 1
+        window = epochs_within(_WINDOW / float(readings.spacing)) if use_gyro else 1
         start, _, _ = _windows(readings, trial, window, use_gyro)
         for turn in turns:
             C = Rotation.from_rotvec([0.0, 0.0, turn * np.pi]).as_matrix() @ start.C_nb
@@ -436,21 +435,6 @@ def _windows(
     readings: MotionReadings, delay: float, window: int, use_gyro: bool
 ) -> tuple[Trajectory, np.ndarray, float]:
     return window_attitudes(readings, delay, 2.0 if use_gyro else _COURSE_STD, window, gyro=use_gyro)
-
-
-def _delay_by_windows(readings: MotionReadings) -> float:
-    """Delay at which windows of epochs, turned by the gyro, fit best: the least of a grid and its neighbours."""
-    window = _odd(_WINDOW / float(readings.spacing))
-    misfits = np.array([_windows(readings, delay, window, True)[2] for delay in _DELAYS])
-    k = int(np.clip(np.argmin(misfits), 1, len(_DELAYS) - 2))
-    before, least, after = misfits[k - 1 : k + 2]
-    bend = before - 2 * least + after
-    offset = 0.5 * (before - after) / bend if bend > 0 else 0.0
-    return float(_DELAYS[k] + np.clip(offset, -1, 1) * (_DELAYS[1] - _DELAYS[0]))
-
-
-def _odd(count: float) -> int:
-    return 2 * round(max(count - 1, 2) / 2) + 1
 
 
 def _turns_around(readings: MotionReadings, wind: np.ndarray) -> bool:

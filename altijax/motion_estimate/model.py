@@ -189,7 +189,7 @@ def preintegrated_intervals(trajectory: Trajectory, intervals: Intervals) -> tup
 
     def by_raw_rate(columns: jax.Array) -> jax.Array:
         """The scale multiplies the reading before the bias is taken off."""
-        by_bias, by_scale = columns[..., :3], columns[..., 3:]
+        by_bias, by_scale = columns[..., :3], columns[..., 3::4]
         return jnp.concatenate([by_bias, (by_scale - bias * by_bias) / scale], -1)
 
     summed = replace(

@@ -26,12 +26,15 @@ class Preintegrated:
         Maps body vectors at the end of each step to the axes of the beginning.
     velocity : (..., time, 3) m/s
         Integral of the specific force up to the end of each step.
-    turn_by_gyro : (..., 3, 6)
-        Derivative of the final attitude, as a rotation vector, by gyro bias (rad/s) and inverse gyro scale.
-    velocity_by_gyro : (..., 3, 6)
+    turn_by_gyro : (..., 3, 12)
+        Derivative of the final attitude, as a rotation vector, by gyro bias (rad/s) and by the rows of a matrix that
+        the rate is multiplied with.
+    velocity_by_gyro : (..., 3, 12)
         Derivative of the final velocity by the same.
     velocity_by_bias : (..., 3, 3) s
         Derivative of the final velocity by the accelerometer bias.
+    velocity_by_matrix : (..., 3, 3, 3) m/s
+        Derivative of the final velocity by a matrix that the specific force is multiplied with.
     velocity_by_turn : (..., 3, 3) m/s
         Derivative of the final velocity by a rotation vector that grows evenly over the interval.
     """
@@ -41,6 +44,7 @@ class Preintegrated:
     turn_by_gyro: jax.Array
     velocity_by_gyro: jax.Array
     velocity_by_bias: jax.Array
+    velocity_by_matrix: jax.Array
     velocity_by_turn: jax.Array
 
 
@@ -118,7 +122,8 @@ def preintegrate(f_b: ArrayLike, w_b: ArrayLike, C: ArrayLike, turn: ArrayLike, 
     velocity = jnp.cumsum(gains, -2)
     # What turns the body at the middle of a step turns all the velocity that is gained after it.
     after = velocity[..., -1:, :] - velocity + 0.5 * gains
-    by_gyro = jnp.concatenate([middle, -middle * w_b[..., None, :]], -1)
+    by_matrix = -middle[..., :, None] * w_b[..., None, None, :]
+    by_gyro = jnp.concatenate([middle, by_matrix.reshape(*middle.shape[:-1], 9)], -1)
     rows = jnp.concatenate([jnp.ones_like(after[..., :1]), after], -1)
     sums = jnp.einsum("...ta,...tbj->...abj", rows, by_gyro)
     # Of the outer products of two vectors, the cross product.
@@ -131,5 +136,6 @@ def preintegrate(f_b: ArrayLike, w_b: ArrayLike, C: ArrayLike, turn: ArrayLike, 
         turn_by_gyro=-sums[..., 0, :, :],
         velocity_by_gyro=levered,
         velocity_by_bias=-sums[..., 0, :, :3],
+        velocity_by_matrix=jnp.einsum("...tai,...tj->...aij", middle, f_b),
         velocity_by_turn=-skew(jnp.sum(middles[..., None] * gains, -2)),
     )

@@ -25,7 +25,7 @@ from altijax.motion_estimate.model import (
     moved,
     preintegrated_intervals,
 )
-from altijax.motion_estimate.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
+from altijax.inference.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 
 # A velocity more than so many standard deviations from what all others say is trusted that much less.
 _GATE = 4.0

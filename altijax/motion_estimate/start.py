@@ -18,6 +18,10 @@ _ACCELERATION_STD = 0.3
 # Below this speed the direction of travel says nothing, m/s.
 _SLOWEST = 1.0
 
+# Delays of receivers, s, and how long epochs share an attitude to tell which fits, s; the attitude itself is free, rad.
+_DELAYS = np.arange(-0.2, 1.05, 0.1)
+_DELAY_WINDOW, _FREE = 15.0, 2.0
+
 # XLA's newer way to compile loops for CPUs takes half as long again, for programs that run no faster.
 quick_jit = partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": False})
 
@@ -136,3 +140,30 @@ def _course(v: np.ndarray) -> np.ndarray:
     last = np.maximum.accumulate(np.where(fast, np.arange(len(v)), -1))
     k = np.where(last < 0, np.argmax(fast), last)
     return np.arctan2(v[k, 1], v[k, 0])
+
+
+def epochs_within(count: float) -> int:
+    """The odd number nearest to a number of epochs, 3 or more."""
+    return 2 * round(max(count - 1, 2) / 2) + 1
+
+
+def delay_by_windows(readings: MotionReadings) -> float:
+    """How late the receiver's stamps are, by the windows of epochs that fit best.
+
+    Parameters
+    ----------
+    readings : MotionReadings
+        IMU readings, the gyro's among them, and GNSS velocities.
+
+    Returns
+    -------
+    delay : float
+        The least of a parabola through the best of a grid and its neighbours, s.
+    """
+    window = epochs_within(_DELAY_WINDOW / float(readings.spacing))
+    misfits = np.array([window_attitudes(readings, delay, _FREE, window, gyro=True)[2] for delay in _DELAYS])
+    k = int(np.clip(np.argmin(misfits), 1, len(_DELAYS) - 2))
+    before, least, after = misfits[k - 1 : k + 2]
+    bend = before - 2 * least + after
+    offset = 0.5 * (before - after) / bend if bend > 0 else 0.0
+    return float(_DELAYS[k] + np.clip(offset, -1, 1) * (_DELAYS[1] - _DELAYS[0]))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from altijax.motion_estimate.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
+from altijax.inference.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 
 T, N, ROWS = 6, 4, 2
 NAMES = ("F", "c", "Q", "z", "H", "R", "x0", "P0")

@@ -1,0 +1,85 @@
+"""From a recording to the arrays of the vehicle's smoother: summed IMU readings, instants, and what is measured there."""
+
+from typing import Any
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from altijax.drives import gravity_at, imu_of, start_of, usual_step, without_bursts
+from altijax.motion_estimate.intervals import MotionReadings
+from altijax.padding import bucket, padded
+from altijax.recordings import Recording
+from altijax.vehicle.measurements.doppler_velocity import velocities
+from altijax.vehicle.parts import Rows
+
+_SAMPLES, _INSTANTS, _STEPS, _EVEN = 16384, 64, 16, 8
+_BEYOND = 1.0
+
+
+def usual_epochs(recording: Recording) -> float:
+    found = velocities(recording)
+    return np.inf if found is None else float(np.median(np.diff(found[0])))
+
+
+def readings_of(
+    recording: Recording, *, use_gyro: bool, delay: float, shortest: float, longest: float
+) -> MotionReadings:
+    """IMU readings and instants: at the epochs of the receiver, and between and beyond them on the IMU's clock."""
+    imu, start = imu_of(recording), start_of(recording)
+    t = without_bursts(imu.index.to_numpy(float) - start)
+    usual = usual_step(t)
+    gyro = imu[["gx", "gy", "gz"]].to_numpy(float) if use_gyro else np.zeros((t.size, 3))
+    gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
+    readings = np.concatenate([imu[["ax", "ay", "az"]].to_numpy(float), gyro, np.zeros((t.size, 1))], -1)
+    pad = bucket(t.size + int(np.ceil(_BEYOND / usual)), _SAMPLES) - t.size
+    t_padded = np.append(t, t[-1] + usual * np.arange(1, pad + 1))
+    readings = np.concatenate([readings, np.repeat(readings[-1:], pad, 0)])
+    areas = 0.5 * (readings[1:] + readings[:-1]) * np.diff(t_padded)[:, None]
+    sums = np.concatenate([np.zeros((1, 7)), np.cumsum(areas, 0)])
+    # A gap's indicator is a step, not a straight line: kept as a sum alone.
+    sums[:, 6] = np.append(0.0, np.cumsum(np.where(np.append(gaps, np.zeros(pad, bool))[:-1], np.diff(t_padded), 0.0)))
+
+    epochs = _epochs(recording, t[-1], delay, shortest)
+    instant, delayed = _instants(epochs, t[-1], delay, longest)
+    widest = float(np.max(np.diff(np.where(delayed > 0, instant - delay, instant))))
+    steps = int(np.ceil(widest / usual / _EVEN)) * _EVEN
+    size = bucket(instant.size, _INSTANTS)
+    arrays: dict[str, Any] = dict(
+        t=t_padded,
+        readings=readings,
+        sums=sums,
+        instant=padded(instant, size, t[-1]),
+        delayed=padded(delayed, size, 0.0),
+        v_gnss=np.zeros((size, 3)),
+        std=np.full((size, 3), np.inf),
+        spacing=np.float64(np.median(np.diff(epochs)) if epochs.size > 1 else longest),
+        share=np.minimum(np.arange(bucket(steps, _STEPS) + 1) / steps, 1.0),
+        gravity=np.float64(gravity_at(recording)),
+    )
+    return MotionReadings(**arrays)
+
+
+def _epochs(recording: Recording, end: float, delay: float, shortest: float) -> np.ndarray:
+    """Times of the epochs within the IMU's span, on the receiver's clock, none too close to the one before."""
+    found = velocities(recording)
+    if found is None:
+        return np.empty(0)
+    epochs = found[0]
+    epochs = epochs[(epochs - delay >= 0) & (epochs - delay <= end)]
+    if epochs.size < 2:
+        return epochs
+    every = max(1, round(shortest / float(np.median(np.diff(epochs)))))
+    return epochs[::every]
+
+
+def _instants(epochs: np.ndarray, end: float, delay: float, longest: float) -> tuple[np.ndarray, np.ndarray]:
+    """The epochs and instants between them and beyond, and whether each is on the receiver's clock."""
+    known = np.concatenate([[delay], epochs, [end + delay]])
+    known = known[np.append(True, np.diff(known) > 1e-6)]
+    parts = np.maximum(1, np.ceil(np.diff(known) / longest - 0.5)).astype(int)
+    between = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(known[:-1], known[1:], parts, strict=True)]
+    instant = np.concatenate([known[:1], *between])
+    inside = (instant >= epochs[0]) & (instant <= epochs[-1]) if epochs.size else np.zeros(instant.size, bool)
+    return np.where(inside, instant, instant - delay), inside.astype(float)

@@ -1,0 +1,52 @@
+"""A set of sensors as a set of names: the parts of the state, the noise levels and the measurements that they make up."""
+
+from collections.abc import Iterable, Mapping
+
+from altijax.inference.layout import Layout
+from altijax.vehicle import inertial
+from altijax.vehicle.measurements import course, doppler_velocity, gnss_position, known_height, standstill, wheel_speed
+from altijax.vehicle.parts import Kind, Level, Part
+
+KINDS: Mapping[str, Kind] = {
+    "velocity": doppler_velocity.KIND,
+    "position": gnss_position.KIND,
+    "wheel": wheel_speed.KIND,
+    "course": course.KIND,
+    "standstill": standstill.KIND,
+    "height": known_height.KIND,
+}
+"""Kinds of measurements by name."""
+
+LEVERS = ("antenna", "axle")
+
+Use = tuple[str, ...]
+"""Names of `KINDS` in use, "gyro", and "wind" for a craft in moving air."""
+
+
+def kinds_of(use: Use) -> dict[str, Kind]:
+    """The kinds of measurements of a set."""
+    return {name: kind for name, kind in KINDS.items() if name in use}
+
+
+def parts_of(use: Use) -> dict[str, Part]:
+    """The parts of the state of a set, in their order."""
+    parts = inertial.PARTS | (inertial.GYRO_PARTS if "gyro" in use else inertial.TURNING_PARTS)
+    for kind in kinds_of(use).values():
+        parts = parts | kind.parts
+    if "gyro" not in use:
+        # What turns too fast to be known tells nothing of where sensors are.
+        parts = {name: part for name, part in parts.items() if name not in LEVERS}
+    return parts | (course.WIND if "wind" in use else {})
+
+
+def levels_of(use: Use) -> dict[str, Level]:
+    """The noise levels of a set."""
+    levels = inertial.LEVELS | ({} if "gyro" in use else inertial.TURNING_LEVELS)
+    for kind in kinds_of(use).values():
+        levels = levels | kind.levels
+    return levels
+
+
+def layout_of(use: Use) -> Layout:
+    """Where the parts lie."""
+    return Layout(tuple((name, part.size) for name, part in parts_of(use).items()))
