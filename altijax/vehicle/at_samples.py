@@ -28,9 +28,9 @@ class Samples:
     C_nb : (samples, 3, 3)
         Attitude.
     v_n, p_n : (samples, 3) m/s, m
-        Velocity and position, East, North and up.
+        Velocity and position, East, North and up, of the antenna where there is one, else of the IMU.
     way : (samples,) m
-        Way.
+        Way of the IMU.
     covariance : (samples, 10, 10)
         Of the errors of attitude (a rotation vector in navigation axes, rad), velocity, position and way.
     """
@@ -81,11 +81,21 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
         for name, fine in series.items()
     )
     way = np.interp(inside, knots, along(np.asarray(x["way"]), between.way))
-    P = _covariance(inside, layout, fit, between, levels)
-    # A reading is of its stamp, or the mean since the one before: by half a sample all may be late.
-    late = np.median(np.diff(t)) / 2
     turning = np.gradient(C_nb, t, axis=0) @ np.swapaxes(C_nb, -1, -2)
     rate = np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], -1)
+    P = _covariance(inside, layout, fit, between, levels)
+    if "antenna" in layout:
+        arm = np.einsum("tij,j->ti", C_nb, np.asarray(x["antenna"])[-1])
+        around = np.cross(rate, arm)
+        # Of attitude, velocity, position and way at the antenna by the same at the IMU and the lever.
+        J = np.zeros((t.size, 10, 13))
+        J[:, range(10), range(10)] = 1
+        J[:, 3:6, :3], J[:, 6:9, :3] = -_skew(around), -_skew(arm)
+        J[:, 3:6, 10:], J[:, 6:9, 10:] = _skew(rate) @ C_nb, C_nb - C_nb[:1]
+        P = J @ P @ np.swapaxes(J, -1, -2)
+        v_n, p_n = v_n + around, p_n + arm - arm[:1]
+    # A reading is of its stamp, or the mean since the one before: by half a sample all may be late.
+    late = np.median(np.diff(t)) / 2
     shift = late * np.concatenate([rate, np.gradient(v_n, t, axis=0), np.zeros((t.size, 4))], -1)
     P += shift[:, :, None] * shift[:, None, :]
     return Samples(t=t, C_nb=C_nb, v_n=v_n, p_n=p_n, way=way, covariance=P)
@@ -94,7 +104,8 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
 def _covariance(
     t: np.ndarray, layout: Layout, fit: Fit, between: Between, levels: dict[str, float]
 ) -> np.ndarray:
-    moving = np.concatenate([np.arange(layout.size)[layout.at(name)] for name in MOVING])
+    named = (*MOVING, "antenna") if "antenna" in layout else MOVING
+    moving = np.concatenate([np.arange(layout.size)[layout.at(name)] for name in named])
     distinct = np.append(True, np.diff(between.instants) > 1e-9)
     nodes, P = between.instants[distinct], np.asarray(fit.covariance)[distinct][:, moving[:, None], moving]
     k = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, nodes.size - 2)
@@ -109,6 +120,14 @@ def _covariance(
     P[:, range(3), range(3)] += turned[:, None]
     P[:, range(3, 6), range(3, 6)] += shaken[:, None]
     return P
+
+
+def _skew(v: np.ndarray) -> np.ndarray:
+    """Matrices (..., 3, 3) of the cross product with vectors (..., 3)."""
+    zero = np.zeros_like(v[..., 0])
+    x, y, z = np.moveaxis(v, -1, 0)
+    rows = [np.stack(row, -1) for row in ((zero, -z, y), (z, zero, -x), (-y, x, zero))]
+    return np.stack(rows, -2)
 
 
 def as_table(recording: Recording, samples: Samples) -> pd.DataFrame:

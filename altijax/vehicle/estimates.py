@@ -18,7 +18,7 @@ from altijax.vehicle.at_samples import Samples, as_table, at_samples
 from altijax.vehicle.beliefs import belief_of
 from altijax.vehicle.inertial import MOVING
 from altijax.vehicle.measurements import standstill
-from altijax.vehicle.measurements.doppler_velocity import velocities
+from altijax.vehicle.measurements.doppler_velocity import GNSS_DELAY, velocities
 from altijax.vehicle.measurements.gnss_position import origin_of
 from altijax.vehicle.mounting import mounting_of
 from altijax.vehicle.search import Search, best_start, likely, said_between
@@ -31,6 +31,10 @@ its places; that a vehicle goes where it points; that it stands where the IMU is
 
 # Means of squared surprises beyond which the errors that are stated are not to be believed.
 _CONSISTENT = 2.0
+# Delays of receivers to start from without a gyro, s, and how far from the usual one that which windows of epochs find
+# may be before that one is tried as well.
+_DELAYS = (0.05, 0.35, 0.65)
+_DOUBTFUL = 0.15
 
 
 def estimate_drive(
@@ -151,14 +155,18 @@ def smoothed(
     """The most probable motion and noise levels of a recording, its axes the vehicle's."""
     use = (*sources, *(("height",) if heights else ()))
     belief = belief_of(use, calibration)
-    delay = None
     if calibration is not None and "gnss_delay" in calibration.values:
-        delay = float(calibration.values["gnss_delay"])
-    elif "velocity" in use and "gyro" in use:
+        delays: tuple[float, ...] = (float(calibration.values["gnss_delay"]),)
+    elif "velocity" not in use:
+        delays = (0.0,)
+    elif "gyro" in use:
         stage("delay of the GNSS velocities")
-        delay = receiver_delay(recording)
+        found = receiver_delay(recording)
+        delays = (found, GNSS_DELAY.mean) if abs(found - GNSS_DELAY.mean) > _DOUBTFUL else (found,)
+    else:
+        delays = _DELAYS
     stage("first trajectory")
-    return likely(best_start(recording, use, delay, belief, heights), stage)
+    return likely(best_start(recording, use, delays, belief, heights), stage)
 
 
 def _mounting(recording: Recording, sources: Use) -> Rotation:

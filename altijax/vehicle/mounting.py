@@ -1,4 +1,4 @@
-"""How the IMU is turned in its vehicle, from gravity and from forward force against change of speed."""
+"""How the IMU is turned in its vehicle, from gravity and from forces against changes of speed and turns."""
 
 import numpy as np
 import pandas as pd
@@ -18,8 +18,8 @@ _SURE = 4.0
 
 
 def mounting_of(recording: Recording, speed: pd.Series) -> Rotation:
-    """Rotation from the IMU's axes to the vehicle's: up is where gravity points on average, forward where forces are
-    that change the speed.
+    """Rotation from the IMU's axes to the vehicle's: up is where gravity points on average, forward where
+    forces are that change the speed, and left where those of turns are.
 
     Parameters
     ----------
@@ -42,19 +42,21 @@ def mounting_of(recording: Recording, speed: pd.Series) -> Rotation:
     level = Rotation.from_rotvec(axis / max(size, 1e-12) * np.arctan2(size, up[2]))
     t_speed = speed.index.to_numpy(float)
     inside = (t >= t_speed[0]) & (t <= t_speed[-1])
-    t, force = t[inside] - t[0], level.apply(force[inside])
-    if t.size < 10:
+    if inside.sum() < 10:
         return Rotation.identity()
-    series = np.vstack([np.interp(t, t_speed - imu.index[0], speed.to_numpy(float)), force.T[:2]])
-    smooth = low_pass(t, series, _CUTOFF)
-    change = np.gradient(smooth[0], t)
-    change, forces = change - change.mean(), smooth[1:] - smooth[1:].mean(1, keepdims=True)
-    power = change @ change
-    slope = forces @ change / max(power, 1e-12)
-    rest = forces - slope[:, None] * change
-    # Of samples that belong together for as long as the low pass lasts.
-    apart = max(t.size * np.median(np.diff(t)) * 2 * _CUTOFF, 2.0)
-    error = np.sqrt((rest * rest).mean() * t.size / max(power, 1e-12) / apart)
-    yaw = np.arctan2(slope[1], slope[0]) if np.hypot(*slope) > _SURE * error else 0.0
+    rate = imu[["gx", "gy", "gz"]].to_numpy(float) if "gx" in imu else np.zeros_like(force)
+    t, force, turning = t[inside], level.apply(force[inside]), level.apply(rate[inside])[:, 2]
+    smooth = low_pass(t - t[0], np.vstack([np.interp(t, t_speed, speed.to_numpy(float)), force.T[:2], turning]), _CUTOFF)
+    # As complex numbers, forward and to the left: forces are the accelerations, turned by the yaw of the mounting.
+    expected = np.gradient(smooth[0], t) + 1j * smooth[0] * smooth[3]
+    read = smooth[1] + 1j * smooth[2]
+    expected, read = expected - expected.mean(), read - read.mean()
+    power = max(np.vdot(expected, expected).real, 1e-12)
+    slope = np.vdot(expected, read) / power
+    rest = read - slope * expected
+    # Samples belong together for as long as the low pass lasts.
+    apart = max((t[-1] - t[0]) * 2 * _CUTOFF, 2.0)
+    error = np.sqrt(np.mean(np.abs(rest) ** 2) / apart * t.size / power)
+    yaw = float(np.angle(slope)) if abs(slope) > _SURE * error else 0.0
     found = Rotation.from_rotvec([0.0, 0.0, -yaw]) * level
     return found if found.magnitude() > _SMALL else Rotation.identity()

@@ -1,6 +1,6 @@
 """The most probable motion and noise levels of a recording, from a start by windows of epochs or by wheels."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -29,8 +29,8 @@ _pass = quick_jit(vehicle_pass, static_argnums=0)
 _LONGEST, _LONGEST_EVEN = 1.0, 0.5
 # Epochs that come faster are averaged: velocities of a vehicle run straight for this long, s, those of a hand for that.
 _SHORTEST, _SHORTEST_FREE = 0.4, 0.1
-# Starts without a gyro, which only then must be tried: delays of a receiver, s.
-_DELAYS = (0.05, 0.35, 0.65)
+# Factor on the variances of wheels and the course while a first attitude may be off by a right angle.
+_EASED = 1e8
 # A start must be better than the one before by this much of a log-likelihood.
 _BETTER = 1.0
 
@@ -109,7 +109,7 @@ def begun(
     readings = readings_of(recording, use_gyro=gyro, delay=delay, shortest=shortest, longest=longest)
     rows = rows_at(recording, use, readings, delay, heights)
     layout = layout_of(use)
-    start = first_trajectory(recording, layout, readings, rows, delay, gyro=gyro)
+    start = first_trajectory(recording, use, readings, rows, delay)
     x = start.x + belief.mean * (np.abs(start.x).max(0) == 0)
     x[:, layout.at("attitude")] = 0
     if "gnss_delay" in layout:
@@ -127,9 +127,10 @@ def begun(
 
 
 def best_start(
-    recording: Recording, use: Use, delay: float | None, belief: Belief, heights: list[tuple[float, float]]
+    recording: Recording, use: Use, delays: Sequence[float], belief: Belief, heights: list[tuple[float, float]]
 ) -> Search:
-    """The best of several starts after some passes: turned about the vertical with a gyro, by several delays without.
+    """The best of several starts after some passes: by several delays, and turned about the vertical where nothing
+    tells the course.
 
     Parameters
     ----------
@@ -137,8 +138,8 @@ def best_start(
         The recording.
     use : tuple of str
         The set of sensors.
-    delay : float or None
-        How late the receiver's stamps are, s, as far as known.
+    delays : sequence of float
+        How late the receiver's stamps may be, s.
     belief : Belief
         What is believed beforehand.
     heights : list of (float, float)
@@ -150,17 +151,25 @@ def best_start(
         At its start.
     """
     free = "velocity" in use and "gyro" in use and "course" not in use
-    delays = _DELAYS if delay is None and "velocity" in use else (delay or 0.0,)
     best, least = None, np.inf
     for trial in delays:
         start = begun(recording, use, trial, belief, heights)
         for turn in (0.0, 0.5, 1.0, 1.5) if free else (0.0,):
-            found = passed(turned(start, turn * np.pi), 5)
+            found = passed(eased(turned(start, turn * np.pi)), 5)
+            found = passed(replace(found, doubt=start.doubt), 5)
             objective = objective_of(found)
             if best is None or objective < least - _BETTER:
                 best, least = found, objective
     assert best is not None
     return best
+
+
+def eased(search: Search) -> Search:
+    """The search with little trust in what is linear near the truth alone, where velocities lead there without it."""
+    if "velocity" not in search.rows:
+        return search
+    doubt = {name: x if name == "velocity" else _EASED * x for name, x in search.doubt.items()}
+    return replace(search, doubt=doubt)
 
 
 def turned(search: Search, angle: float) -> Search:

@@ -6,7 +6,6 @@ import jax
 import numpy as np
 
 from altijax.drives import imu_of, start_of
-from altijax.inference.layout import Layout
 from altijax.motion_estimate.intervals import MotionReadings, instants_at
 from altijax.motion_estimate.readings import motion_readings
 from altijax.motion_estimate.start import delay_by_windows, epochs_within, window_attitudes
@@ -14,6 +13,7 @@ from altijax.recordings import Recording
 from altijax.vehicle.inertial import Trajectory
 from altijax.vehicle.measurements.doppler_velocity import GNSS_DELAY
 from altijax.vehicle.parts import Rows
+from altijax.vehicle.sensors import Use, layout_of
 
 _WINDOW = 15.0  # s
 # Standard deviation of the attitude believed beforehand: level and along the course, rad.
@@ -23,9 +23,10 @@ _BY_WHEEL = 0.5
 
 
 def first_trajectory(
-    recording: Recording, layout: Layout, readings: MotionReadings, rows: dict[str, Rows], delay: float, *, gyro: bool
+    recording: Recording, use: Use, readings: MotionReadings, rows: dict[str, Rows], delay: float
 ) -> Trajectory:
     """The trajectory that a search begins with, at a delay of the receiver (s)."""
+    layout, gyro = layout_of(use), "gyro" in use
     t = np.asarray(jax.device_get(instants_at(readings, np.float64(delay))))
     by_gnss = "velocity" in rows
     if by_gnss:
@@ -37,8 +38,9 @@ def first_trajectory(
         started = replace(
             readings, instant=t, delayed=distinct.astype(float), v_gnss=velocity, std=std, spacing=np.float64(1.0)
         )
-    window = epochs_within(_WINDOW / float(started.spacing)) if gyro else 1
-    prior = _FREE if gyro and by_gnss else _ALONG
+    steps = np.diff(t)
+    window = epochs_within(_WINDOW / float(np.median(steps[steps > 1e-9]))) if gyro else 1
+    prior = _ALONG if "course" in use or not gyro else _FREE
     start, _, _ = window_attitudes(started, delay if by_gnss else 0.0, prior, window, gyro=gyro)
     v, dt = np.asarray(start.v_n), np.diff(t)[:, None]
     speed = np.linalg.norm(v, axis=1)[:, None]
