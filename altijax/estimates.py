@@ -12,7 +12,8 @@ import pandas as pd
 
 from altijax.calibration.drives import NOT_CONVERGED, calibrate_drive
 from altijax.calibration.identifiability import describe_undetermined
-from altijax.calibration.parameters import ACCEPTED, PARAMETERS, require_parameters
+from altijax.calibration.parameters import ACCEPTED, require_parameters
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table, worse_where_held_out
 from altijax.drives import imu_of, start_of
 from altijax.elevation_estimate.calibration import calibrate_elevation

@@ -146,8 +146,8 @@ def calibrate_stretches(
     if not fitted.any():
         raise ValueError(f"no stretch of {STRETCH:g} s lies before the end of the fit")
     chosen = np.array([name in names for name in DRIVE_PARAMETERS])
-    prior = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
-    prior_std = np.where(chosen, [row[1] for row in DRIVE_PARAMETERS.values()], 0.0)
+    prior = np.array([constant.nominal for constant in DRIVE_PARAMETERS.values()])
+    prior_std = np.where(chosen, [constant.spread for constant in DRIVE_PARAMETERS.values()], 0.0)
     with jax.enable_x64(True), stages("calibration by driving") as stage:
         fit, noise = _fit_drive(_seen(stretches, fitted), prior, prior_std, stage)
         stage("what the drive determines")
@@ -166,7 +166,7 @@ def calibrate_stretches(
         {
             "value": values,
             "std": np.asarray(found.std),
-            "unit": [DRIVE_PARAMETERS[name][2] for name in found.names],
+            "unit": [DRIVE_PARAMETERS[name].unit for name in found.names],
             "prior": prior[rows],
             "prior_std": prior_std[rows],
             "shift": (values - prior[rows]) / prior_std[rows],

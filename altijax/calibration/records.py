@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.parameters import CONSTANTS
 
 # Less than this is no difference worth a word.
 _WORSE = 1.01
@@ -67,8 +67,8 @@ class Calibration:
 
     @property
     def std_with_absorbed(self) -> pd.Series:
-        """Standard deviation by name where the constants that were left at nominal may be off as `PARAMETERS` says."""
-        presumed = PARAMETERS["uncertainty"].reindex(self.absorbed.columns).to_numpy(float)
+        """Standard deviation by name where the constants that were left at nominal may be off as `CONSTANTS` says."""
+        presumed = np.array([CONSTANTS[name].spread for name in self.absorbed.columns])
         taken_up = np.square(self.absorbed.to_numpy(float) * presumed).sum(1)
         return np.sqrt(self.std**2 + pd.Series(taken_up, self.absorbed.index).reindex(self.std.index, fill_value=0.0))
 

@@ -14,7 +14,7 @@ import numpy as np
 import pandas as pd
 
 from altijax.calibration.identifiability import describe_undetermined, identify_information
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, constants_table
 from altijax.calibration.serial_correlation import statistical_inefficiency
 from altijax.least_squares import levenberg_marquardt

@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import ACCEPTED, PARAMETERS
+from altijax.calibration.parameters import ACCEPTED
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
 from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
 from altijax.calibration.shared_parameters import fit_shared
@@ -35,7 +36,7 @@ from altijax.speed_estimate.estimates import (
     run_filter,
     samples_between,
 )
-from altijax.speed_estimate.model import STATES, state_names
+from altijax.speed_estimate.model import OF_CONSTANTS, STATES, state_names
 from altijax.speed_estimate.steps import aid_of, drive_in_steps, initial_state, speed_of
 from altijax.stages import stages, tracked
 
@@ -54,8 +55,7 @@ _NEAR = 1.0
 _OWN_STD = (1.0, 0.1)
 # The smallest numbers of stretches, and of speeds of an aid, that arrays are filled up to.
 _FEW, _SPEEDS = 4, 1024
-# The filter's names of constants that it sees from the other side.
-_MIRRORED = {"mounting_yaw": "travel_yaw"}
+_STATE_OF = {constant: (state, sign) for state, (constant, sign) in OF_CONSTANTS.items()}
 
 Array = jax.Array | np.ndarray
 
@@ -290,8 +290,7 @@ def _from_filter(
     method: str,
 ) -> Calibration:
     """One drive after the other, each beginning with what the ones before have left; the reference as the aid."""
-    states = [_MIRRORED.get(name, name) for name in names]
-    signs = np.array([-1.0 if name in _MIRRORED else 1.0 for name in names])
+    states, signs = zip(*(_STATE_OF[name] for name in names), strict=True)
     rows = [state_names(AUTO_SENSORS).index(state) for state in states]
     prior = PARAMETERS.copy()
     prior.loc[names, "uncertainty"] = [STATES[state] for state in states]
