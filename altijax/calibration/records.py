@@ -55,6 +55,10 @@ class Calibration:
         """Value by name."""
         return self.table["value"]
 
+    def known(self) -> dict[str, float]:
+        """Value by name, in plain numbers."""
+        return dict(zip(map(str, self.values.index), self.values.tolist(), strict=True))
+
     @property
     def std(self) -> pd.Series:
         """Standard deviation by name."""
@@ -197,7 +201,7 @@ def correct_imu(imu: pd.DataFrame, calibration: Calibration | None) -> pd.DataFr
     imu : DataFrame
         true = measured / scale - bias; the same table where nothing is known of these.
     """
-    known = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
+    known = {} if calibration is None else calibration.known()
     changed = {}
     for letter, sensor in (("a", "accelerometer"), ("g", "gyro")):
         for axis in "xyz":

@@ -12,7 +12,7 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
-from altijax.calibration.parameters import presumed
+from altijax.calibration.parameters import CONSTANTS, presumed
 
 States = dict[str, jax.Array]
 
@@ -37,11 +37,11 @@ OF_CONSTANTS = {
     "gyro_scale_z": ("gyro_scale_z", -1.0),
     "travel_yaw": ("mounting_yaw", -1.0),
     "travel_pitch": ("mounting_pitch", -1.0),
-    "lever_x": ("lever_arm", 1.0),
     "imu_delay": ("gnss_delay", -1.0),
 }
 """States that are constants of a calibration, their names there, and their sign: the filter sees some from the other
-side. `imu_delay` is that of whatever aids."""
+side. They are zero where readings and aid were corrected. `imu_delay` is that of whatever aids. `lever_x` is none of
+them: the filter begins without a lever whatever was calibrated."""
 
 _SPREAD = {state: presumed([name], SPREADS)[name].spread for state, (name, _) in OF_CONSTANTS.items()}
 
@@ -62,7 +62,7 @@ STATES = {
     "rectification_y": 0.05,
     "travel_yaw": _SPREAD["travel_yaw"],
     "travel_pitch": _SPREAD["travel_pitch"],
-    "lever_x": _SPREAD["lever_x"],
+    "lever_x": CONSTANTS["lever_arm"].spread,
     "lever_y": 0.3,
     "lever_z": 1.0,
     "suspension_roll": 0.03,
