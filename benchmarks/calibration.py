@@ -167,7 +167,7 @@ def accuracy(found: pd.DataFrame, rate: float) -> pd.DataFrame:
 def real_minute() -> pd.DataFrame:
     """Delays and wheel scale of comma2k19-example, as calibrated and as its reference has them."""
     recording = aj.load_dataset("comma2k19-example")
-    table = aj.calibrate_drive(recording).table
+    table = aj.calibrate(recording, list(DRIVE_PARAMETERS), method="drive").table
     true = recording.reference[["v_e", "v_n", "v_u"]].dropna()
     t_true, v_true = true.index.to_numpy(float), true.to_numpy()
     gnss, wheel = recording.gnss[["v_e", "v_n"]].dropna(), recording.wheel["speed"]

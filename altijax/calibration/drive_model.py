@@ -25,7 +25,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-from altijax.calibration.parameters import ACCEPTED, presumed
+from altijax.calibration.parameters import ACCEPTED, presumed, triads
 
 _WIDE = "assumed; wide, for a drive tells it and no prior need hold it"
 SPREADS = {
@@ -168,15 +168,14 @@ def _motion(
     vehicle has then, what the wheels show, speed and right less left (2, nodes), and the velocity left and up
     (2, nodes). So what a stretch has of its own enters by a few vectors, and the turns depend on the gyros alone.
     """
-    bias, gyro_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
-    one = jnp.ones_like(p["gyro_scale_z"])
-    yawed, pitched = jnp.asarray([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], one.dtype)
+    imu = triads(p)
+    yawed, pitched = jnp.asarray([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], own.dtype)
     yawed, pitched, first_turn = _rotations(
         jnp.stack([yawed * p["mounting_yaw"], pitched * p["mounting_pitch"], own[:3]])
     )
     mounting = yawed @ pitched
-    f = mounting @ (stretch.f.T / p["accelerometer_scale"] - bias[:, None])
-    w = mounting @ (stretch.w.T / jnp.stack([one, one, p["gyro_scale_z"]])[:, None] - gyro_bias[:, None])
+    f = mounting @ (stretch.f.T / imu.accelerometer_scale[:, None] - imu.accelerometer_bias[:, None])
+    w = mounting @ (stretch.w.T / imu.gyro_scale[:, None] - imu.gyro_bias[:, None])
     axes = first_turn @ stretch.C_nb @ mounting.T
     turn = w * STEP
     turns = _turns(turn)

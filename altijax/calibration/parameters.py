@@ -6,6 +6,9 @@ gives the reason, and takes its constants from `presumed`.
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import jax.numpy as jnp
 
 
 @dataclass(frozen=True)
@@ -112,6 +115,55 @@ def presumed(names: Iterable[str], spreads: Mapping[str, tuple[float, str]]) -> 
         if name in constants
     }
     return constants | own
+
+
+class Triads(NamedTuple):
+    """An IMU in a car: ``true = euler_to_matrix(mounting) @ (measured / scale - bias)``, from named constants.
+
+    Attributes
+    ----------
+    accelerometer_bias : (3,) m/s^2
+    accelerometer_scale : (3,)
+    gyro_bias : (3,) rad/s
+    gyro_scale : (3,)
+    mounting : (3,) rad
+        Roll, which is zero, pitch and yaw.
+    """
+
+    accelerometer_bias: Any
+    accelerometer_scale: Any
+    gyro_bias: Any
+    gyro_scale: Any
+    mounting: Any
+
+
+def triads(values: Mapping[str, Any], arrays: Any = jnp) -> Triads:
+    """Named constants as those of two triads and their mounting.
+
+    Parameters
+    ----------
+    values : mapping
+        Numbers by name; a constant that is missing is nominal, names of other constants are passed over.
+    arrays : module, optional
+        Of which the arrays are: `jax.numpy`, or `numpy` where no program should be compiled.
+
+    Returns
+    -------
+    triads : Triads
+        Differentiable by the values.
+    """
+
+    def of(kind: str) -> Any:
+        names = [f"{kind}_{axis}" for axis in "xyz"]
+        return arrays.stack([values.get(name, CONSTANTS[name].nominal) for name in names])
+
+    return Triads(
+        accelerometer_bias=of("accelerometer_bias"),
+        accelerometer_scale=values.get("accelerometer_scale", 1.0) * of("accelerometer_scale"),
+        gyro_bias=of("gyro_bias"),
+        gyro_scale=of("gyro_scale"),
+        mounting=arrays.stack([0.0, values.get("mounting_pitch", 0.0), values.get("mounting_yaw", 0.0)]),
+    )
 
 
 def require_parameters(parameters: str | Iterable[str], method: str) -> list[str]:

@@ -17,7 +17,7 @@ import numpy as np
 
 from altijax import _safe
 from altijax.altitude import slope_sine, vertical_acceleration
-from altijax.calibration.parameters import ACCEPTED, CONSTANTS
+from altijax.calibration.parameters import ACCEPTED, CONSTANTS, triads
 from altijax.drives import Array, Drive
 from altijax.padding import bucket, padded
 from altijax.rotations import euler_to_matrix
@@ -179,11 +179,9 @@ def _linearised(
 
 
 def _elevation(value: dict[str, jax.Array], readings: _Readings, method: str) -> dict[str, jax.Array]:
-    scale = value["accelerometer_scale"] * jnp.stack([value[f"accelerometer_scale_{axis}"] for axis in "xyz"])
-    bias = jnp.stack([value[f"accelerometer_bias_{axis}"] for axis in "xyz"])
-    f_s = readings.f / scale[:, None] - bias[:, None]
-    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), value["mounting_pitch"], value["mounting_yaw"]]))
-    f_x, f_y, f_z = mounting @ f_s
+    imu = triads(value)
+    f_s = readings.f / imu.accelerometer_scale[:, None] - imu.accelerometer_bias[:, None]
+    f_x, f_y, f_z = euler_to_matrix(imu.mounting) @ f_s
     # A sensor ahead of the point that moves along the path is drawn backwards in turns.
     bias = value["yaw_rate_bias"]
     f_x = f_x + value["lever_arm"] * (readings.yaw_rate_squared - 2 * bias * readings.yaw_rate + bias**2)

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import ACCEPTED
+from altijax.calibration.parameters import ACCEPTED, triads
 from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
 from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
@@ -24,7 +24,6 @@ from altijax.drives import gravity_at, imu_of, start_of
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 from altijax.rotations import euler_to_matrix
-from altijax.sensors import Accelerometer, Gyro, correct_accelerometer, correct_gyro
 from altijax.series import interpolated, means_between
 from altijax.speed import speed_with_aided_roll, speed_with_roll, speed_without_roll
 from altijax.speed_estimate.estimates import (
@@ -263,14 +262,10 @@ def _solve(
 
 
 def _dead_reckoned(values: dict[str, jax.Array], own: jax.Array, stretch: _Stretches, method: str) -> jax.Array:
-    def triad(kind: str) -> jax.Array:
-        return jnp.stack([values[f"{kind}_{axis}"] for axis in "xyz"])
-
-    scale = values["accelerometer_scale"] * triad("accelerometer_scale")
-    f = correct_accelerometer(Accelerometer(bias=triad("accelerometer_bias"), scale=scale), stretch.f)
-    w = correct_gyro(Gyro(bias=triad("gyro_bias"), scale=triad("gyro_scale")), stretch.w, f)
-    angles = [values[name] for name in ("mounting_pitch", "mounting_yaw")]
-    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), *angles]))
+    imu = triads(values)
+    f = stretch.f / imu.accelerometer_scale - imu.accelerometer_bias
+    w = stretch.w / imu.gyro_scale - imu.gyro_bias
+    mounting = euler_to_matrix(imu.mounting)
     (f_x, f_y, _), (_, w_y, w_z) = (f @ mounting.T).T, (w @ mounting.T).T
     start = own[0], own[1], stretch.gravity, _STEP
     if method == "conventional":

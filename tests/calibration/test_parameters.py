@@ -3,11 +3,15 @@
 import ast
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 
 from altijax.calibration.drive_model import DRIVE_PARAMETERS
-from altijax.calibration.parameters import ACCEPTED, CONSTANTS, presumed, require_parameters
+from altijax.calibration.parameters import ACCEPTED, CONSTANTS, presumed, require_parameters, triads
 from tests.docstrings import PACKAGE
 
 # Where a method has spreads of its own.
@@ -65,6 +69,26 @@ def test_what_is_presumed_is_the_table_but_for_the_spread() -> None:
         "an odd car",
     )
     assert list(DRIVE_PARAMETERS) == ACCEPTED["drive"] and DRIVE_PARAMETERS["gnss_delay"].unit == "s"
+
+
+@pytest.mark.parametrize("arrays", [np, jnp])
+def test_triads_are_nominal_but_for_what_is_named(arrays: ModuleType) -> None:
+    ideal = triads({}, arrays)
+    assert [np.asarray(part).tolist() for part in ideal] == [[0] * 3, [1] * 3, [0] * 3, [1] * 3, [0] * 3]
+    values = {"accelerometer_scale": 1.02, "accelerometer_scale_y": 0.98, "gyro_bias_z": 0.1, "mounting_yaw": 0.2}
+    found = triads(values | {"wheel_scale": 2.0}, arrays)
+    np.testing.assert_allclose(found.accelerometer_scale, [1.02, 1.02 * 0.98, 1.02], rtol=1e-6)
+    np.testing.assert_allclose([found.gyro_bias[2], found.mounting[2]], [0.1, 0.2], rtol=1e-6)
+
+
+@pytest.mark.parametrize("dtype", [jnp.float32, jnp.float64])
+def test_triads_keep_the_precision_and_have_derivatives(dtype: type) -> None:
+    with jax.enable_x64(True):
+        x = jnp.asarray(1.01, dtype)
+        found = triads({"accelerometer_scale_x": x})
+        assert found.accelerometer_scale.dtype == dtype
+        slope = jax.jacfwd(lambda x: triads({"accelerometer_scale_x": x}).accelerometer_scale)(x)
+        np.testing.assert_array_equal(slope, [1, 0, 0])
 
 
 def test_names_are_checked_against_the_method() -> None:
