@@ -49,10 +49,6 @@ from .calibration.allan import (
     averaging_factors as averaging_factors,
     fit_allan as fit_allan,
 )
-from .calibration.drives import (
-    DriveCalibration as DriveCalibration,
-    calibrate_drive as calibrate_drive,
-)
 from .calibration.experiment_design import (
     drive_information as drive_information,
     driving_protocol as driving_protocol,

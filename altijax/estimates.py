@@ -7,14 +7,10 @@ estimate never looks at the recording's reference: `calibrate` may, up to `until
 import warnings
 from collections.abc import Iterable
 
-import numpy as np
-import pandas as pd
-
-from altijax.calibration.drives import NOT_CONVERGED, calibrate_drive
-from altijax.calibration.identifiability import describe_undetermined
-from altijax.calibration.parameters import ACCEPTED, PARAMETERS, require_parameters
-from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table, worse_where_held_out
-from altijax.drives import imu_of, start_of
+from altijax.calibration.drives import calibrate_driving
+from altijax.calibration.parameters import ACCEPTED, require_parameters
+from altijax.calibration.priors import PARAMETERS
+from altijax.calibration.records import Calibration, worse_where_held_out
 from altijax.elevation_estimate.calibration import calibrate_elevation
 from altijax.elevation_estimate.estimates import estimate_elevation, score_elevation
 from altijax.elevation_estimate.model import ELEVATION_METHODS
@@ -44,6 +40,7 @@ _FITS = {
     ELEVATION_METHODS: calibrate_elevation,
     SPEED_METHODS: calibrate_speed,
     MOTION_METHODS: calibrate_motion,
+    ("drive",): calibrate_driving,
 }
 
 
@@ -98,34 +95,9 @@ def calibrate(
     names = require_parameters(parameters, method)
     if not recordings:
         raise ValueError("calibrate needs one recording or more, got none")
-    if method == "drive":
-        found = _calibrate_drive(recordings, names, until)
-    else:
-        fit = next(fit for methods, fit in _FITS.items() if method in methods)
-        found = fit(recordings, names, method=method, until=until)
+    fit = next(fit for methods, fit in _FITS.items() if method in methods)
+    found = fit(recordings, names, method=method, until=until)
     for sentence in (*found.undetermined, worse_where_held_out(found)):
         if sentence:
             warnings.warn(sentence, stacklevel=2)
     return found
-
-
-def _calibrate_drive(recordings: list[Recording], names: list[str], until: float | None) -> Calibration:
-    """The record of `calibrate_drive`; its residuals are in units of the noise that it found."""
-    drive = calibrate_drive(recordings, names, until=until)
-    order = list(drive.identification.names)
-    start = min(start_of(recording) for recording in recordings)
-    end = max(float(imu_of(recording).index[-1]) for recording in recordings)
-    together = ", ".join(recording.name for recording in recordings)
-    interval = start, end if until is None else until, end
-    rows = [
-        held_out_row(together, str(kind), "1", interval, [np.nan, np.nan], [row["nominal"], row["fitted"]])
-        for kind, row in drive.held_out.iterrows()
-    ]
-    return Calibration(
-        method="drive",
-        table=constants_table(drive.table).loc[names],
-        correlation=pd.DataFrame(drive.identification.correlation, order, order).astype(float).loc[names, names],
-        absorbed=pd.DataFrame(index=names),
-        undetermined=(*([] if drive.converged else [NOT_CONVERGED]), *describe_undetermined(drive.identification)),
-        held_out=held_out_table(rows),
-    )

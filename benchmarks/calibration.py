@@ -37,8 +37,8 @@ from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, tow
 GRAVITY, DENSITY = 9.80665, {"gyro": float(aj.MEMS_GYRO.noise_density)}
 DENSITY["accelerometer"] = float(aj.MEMS_ACCELEROMETER.noise_density)
 DENSITY["receiver"] = 0.0
-NOMINAL = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
-PRIOR_STD = np.array([row[1] for row in DRIVE_PARAMETERS.values()])
+NOMINAL = np.array([constant.nominal for constant in DRIVE_PARAMETERS.values()])
+PRIOR_STD = np.array([constant.spread for constant in DRIVE_PARAMETERS.values()])
 
 
 LIMITS = {
@@ -159,7 +159,7 @@ def accuracy(found: pd.DataFrame, rate: float) -> pd.DataFrame:
             "mean std": by_name["std"].mean(),
             "mean error / its std": by_name["error"].mean() / by_name["error"].sem(),
             "coverage of 95 %": inside.groupby(level=1, sort=False).mean(),
-            "unit": pd.Series({name: row[2] for name, row in DRIVE_PARAMETERS.items()}),
+            "unit": pd.Series({name: constant.unit for name, constant in DRIVE_PARAMETERS.items()}),
         }
     )
 
@@ -167,7 +167,7 @@ def accuracy(found: pd.DataFrame, rate: float) -> pd.DataFrame:
 def real_minute() -> pd.DataFrame:
     """Delays and wheel scale of comma2k19-example, as calibrated and as its reference has them."""
     recording = aj.load_dataset("comma2k19-example")
-    table = aj.calibrate_drive(recording).table
+    table = aj.calibrate(recording, list(DRIVE_PARAMETERS), method="drive").table
     true = recording.reference[["v_e", "v_n", "v_u"]].dropna()
     t_true, v_true = true.index.to_numpy(float), true.to_numpy()
     gnss, wheel = recording.gnss[["v_e", "v_n"]].dropna(), recording.wheel["speed"]

@@ -131,7 +131,7 @@ def made_up_drive(seed: int) -> Recording:
     while float(_hardest(truth)) > HARDEST:
         truth = _motion(*_road_and_profile(rng))
     truth = _slipping(truth, rng.uniform(0.001, 0.006))
-    parameters = [nominal + 0.5 * std * rng.normal() for nominal, std, _ in DRIVE_PARAMETERS.values()]
+    parameters = [known.nominal + 0.5 * known.spread * rng.normal() for known in DRIVE_PARAMETERS.values()]
     recorded = _recorded(truth, jnp.asarray(parameters), jax.random.key(seed))
     f, w = (np.array(recorded[name]) for name in "fw")
     # a rougher road shakes more, a rate that shakes shows a bias

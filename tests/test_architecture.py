@@ -15,7 +15,7 @@ ROOT = PACKAGE.parent
 
 # Each level may import from the levels before it; modules of one level know nothing of each other.
 LEVELS = [
-    ["constants", "_shapes", "_safe", "_epoch_fit.trigonometry"],
+    ["constants", "_shapes", "_safe", "_epoch_fit.trigonometry", "calibration.parameters"],
     ["rotations", "signals", "least_squares", "wahba"],
     ["calibration.identifiability", "calibration.serial_correlation", "calibration.standstill"],
     ["_epoch_fit.cost"],
@@ -35,10 +35,10 @@ LEVELS = [
     ["speed_estimate.filter"],
     ["metrics"],
     ["padding", "series", "programs"],
-    ["stages", "formats.stream_checks", "calibration.parameters", "motion_estimate.start"],
+    ["stages", "formats.stream_checks", "motion_estimate.start"],
     ["formats.tidy_folder", "formats.logs", "calibration.records"],
-    ["formats.ublox", "calibration.reference_fit"],
-    ["recordings"],
+    ["formats.ublox", "calibration.priors"],
+    ["recordings", "calibration.reference_fit"],
     ["datasets", "drives"],
     ["motion_estimate.readings", "elevation_estimate.model", "elevation_estimate.smoother", "calibration.drives"],
     ["elevation_estimate.posterior"],

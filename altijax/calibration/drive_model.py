@@ -25,29 +25,23 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
-DRIVE_PARAMETERS = {
-    "wheel_scale": (1.0, 0.03, "1"),
-    "wheel_delay": (0.0, 0.15, "s"),
-    "gnss_delay": (0.0, 0.3, "s"),
-    "accelerometer_bias_x": (0.0, 0.3, "m/s^2"),
-    "accelerometer_bias_y": (0.0, 0.3, "m/s^2"),
-    "accelerometer_bias_z": (0.0, 0.3, "m/s^2"),
-    "accelerometer_scale": (1.0, 0.01, "1"),
-    "gyro_bias_x": (0.0, 0.02, "rad/s"),
-    "gyro_bias_y": (0.0, 0.02, "rad/s"),
-    "gyro_bias_z": (0.0, 0.02, "rad/s"),
-    "mounting_pitch": (0.0, 0.1, "rad"),
-    "mounting_yaw": (0.0, 0.1, "rad"),
-    "gyro_scale_z": (1.0, 0.01, "1"),
-    "weight_transfer": (0.0, 0.1, "1"),
-    "wheel_slip": (0.0, 0.003, "s^2/m"),
-    "lever_arm": (0.0, 1.5, "m"),
-    "antenna_lever_arm": (0.0, 1.0, "m"),
-    "wheel_difference": (0.0, 0.02, "1"),
-    "track_width": (1.5, 0.1, "m"),
+from altijax.calibration.parameters import ACCEPTED, presumed, triads
+
+_WIDE = "assumed; wide, for a drive tells it and no prior need hold it"
+SPREADS = {
+    "wheel_scale": (0.03, "assumed: wheels of another size than the car came with"),
+    "wheel_delay": (0.15, _WIDE),
+    "gnss_delay": (0.3, "receivers that smooth are later than those in `CONSTANTS`"),
+    "mounting_pitch": (0.1, _WIDE),
+    "mounting_yaw": (0.1, _WIDE),
+    "gyro_scale_z": (0.01, "assumed: most units are better than their tolerance"),
+    "weight_transfer": (0.1, "assumed: a soft car"),
+    "lever_arm": (1.5, "assumed: from the rear axle up to the bonnet"),
 }
-"""Parameters by name, in the order of the fit: nominal value, prior standard deviation (a consumer's instrument fixed
-to a car by hand, assumed; a tyre slips by some 1 % at a third of g), unit."""
+"""Spreads that are not those of `CONSTANTS`, and why."""
+
+DRIVE_PARAMETERS = presumed(ACCEPTED["drive"], SPREADS)
+"""Parameters by name, in the order of the fit."""
 
 GROUPS = ("GNSS horizontal", "GNSS vertical", "wheel", "sideways", "upwards", "right less left wheel")
 """Kinds of residuals, in the order of the fields `gnss_std` and `wheel_std` of `Stretch`."""
@@ -174,15 +168,14 @@ def _motion(
     vehicle has then, what the wheels show, speed and right less left (2, nodes), and the velocity left and up
     (2, nodes). So what a stretch has of its own enters by a few vectors, and the turns depend on the gyros alone.
     """
-    bias, gyro_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
-    one = jnp.ones_like(p["gyro_scale_z"])
-    yawed, pitched = jnp.asarray([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], one.dtype)
+    imu = triads(p)
+    yawed, pitched = jnp.asarray([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0]], own.dtype)
     yawed, pitched, first_turn = _rotations(
         jnp.stack([yawed * p["mounting_yaw"], pitched * p["mounting_pitch"], own[:3]])
     )
     mounting = yawed @ pitched
-    f = mounting @ (stretch.f.T / p["accelerometer_scale"] - bias[:, None])
-    w = mounting @ (stretch.w.T / jnp.stack([one, one, p["gyro_scale_z"]])[:, None] - gyro_bias[:, None])
+    f = mounting @ (stretch.f.T / imu.accelerometer_scale[:, None] - imu.accelerometer_bias[:, None])
+    w = mounting @ (stretch.w.T / imu.gyro_scale[:, None] - imu.gyro_bias[:, None])
     axes = first_turn @ stretch.C_nb @ mounting.T
     turn = w * STEP
     turns = _turns(turn)

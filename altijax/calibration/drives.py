@@ -7,7 +7,7 @@ less (Huber). A parameter that the drive does not determine keeps its prior and 
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -17,7 +17,9 @@ from jax.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from altijax.calibration.drive_model import DRIVE_PARAMETERS, GROUPS, STEP, Stretch, drive_residuals, own_states
-from altijax.calibration.identifiability import Identification, identify_information
+from altijax.calibration.identifiability import describe_undetermined, identify_information
+from altijax.calibration.parameters import require_parameters
+from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table, noise_levels
 from altijax.calibration.serial_correlation import statistical_inefficiency
 from altijax.calibration.shared_parameters import SharedFit, fit_shared
 from altijax.drives import gravity_at, imu_of, start_of, wheel_pair
@@ -45,78 +47,45 @@ _TURN_STD, _VELOCITY_STD = 0.5, 5.0
 _LEAST_STRETCHES, _LEAST_EPOCHS, _LEAST_SAMPLES = 3, 26, round(STRETCH / _BIN) + 1
 
 
-@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class DriveCalibration:
-    """Parameters of a drive's sensors, how well they are known, and whether they help where they were not fitted.
-
-    Attributes
-    ----------
-    table : DataFrame
-        One row a parameter: value, std, unit, prior (mean), prior_std, shift (from the prior, in its standard
-        deviations), bits (information gained).
-    identification : Identification
-        What the drive determines; its text names what it does not.
-    noise : Series
-        Standard deviation of each kind of observation, as found, m/s; it includes their correlation.
-    nis : float
-        Normalised innovation squared per degree of freedom with that noise.
-    converged : bool
-        False where the steps were used up, as on a drive that leaves much open: then the bars say too little.
-    held_out : DataFrame
-        Root mean square of the weighted residuals of each kind with nominal and with fitted parameters, on the
-        stretches that were held out, and whether the fit made it worse; empty where none were.
-    """
-
-    table: pd.DataFrame
-    identification: Identification
-    noise: pd.Series
-    nis: float
-    converged: bool
-    held_out: pd.DataFrame
-
-    def __repr__(self) -> str:
-        parts = [self.table.round(5).to_string(), str(self.noise.round(4).to_dict()), f"NIS {self.nis:.2f}"]
-        said = str(self.identification).splitlines()[1 + len(self.identification.names) :]
-        if not self.converged:
-            said = [NOT_CONVERGED, *said]
-        held_out = [] if self.held_out.empty else [self.held_out.round(3).to_string()]
-        return "\n".join([*parts, *said, *held_out])
-
-
-def calibrate_drive(
-    recordings: Recording | Iterable[Recording], parameters: Sequence[str] | None = None, *, until: float | None = None
-) -> DriveCalibration:
-    """Parameters of IMU, wheels and GNSS from ordinary driving, without a reference.
+def calibrate_driving(
+    recordings: Sequence[Recording], names: Sequence[str], *, method: str, until: float | None = None
+) -> Calibration:
+    """Constants of IMU, wheels and GNSS from ordinary driving, without a reference.
 
     Parameters
     ----------
-    recordings : Recording or several
+    recordings : sequence of Recording
         Each with six-axis IMU and GNSS velocities (with climb, as far as there is one) of one car, and its wheel speeds
         if there are any, best one by one; what concerns wheels that were not recorded stays undetermined.
-    parameters : sequence of str, optional
-        Names out of `DRIVE_PARAMETERS`; the others stay nominal. All by default.
+    names : sequence of str
+        Names out of `DRIVE_PARAMETERS`; the others stay nominal.
+    method : {"drive"}
+        Name of the method.
     until : float, optional
         Last time, on the recordings' time axis, used for the fit; the stretches after it are held out.
 
     Returns
     -------
-    calibration : DriveCalibration
-        Values, standard deviations, and what the drive does not determine.
+    calibration : Calibration
+        ``held_out`` has the residuals of each kind of observation on the stretches that were held out, in units of the
+        noise that was found.
 
     Raises
     ------
     ValueError
-        If a stream is missing, a name is unknown or a drive is shorter than a stretch.
+        If a stream is missing, or a drive is shorter than a stretch.
     """
-    recordings = [recordings] if isinstance(recordings, Recording) else list(recordings)
     stretches, starts = zip(*(_of_recording(recording) for recording in recordings), strict=True)
     fitted = np.concatenate(starts) + STRETCH <= (np.inf if until is None else until)
-    return calibrate_stretches(_stacked(stretches), parameters, fitted=fitted)
+    calibration, sizes = _calibrated(_stacked(stretches), names, fitted)
+    together = ", ".join(recording.name for recording in recordings)
+    end = max(float(imu_of(recording).index[-1]) for recording in recordings)
+    interval = min(start_of(recording) for recording in recordings), end if until is None else until, end
+    rows = [held_out_row(together, kind, "1", interval, [np.nan, np.nan], pair) for kind, pair in sizes.items()]
+    return replace(calibration, method=method, held_out=held_out_table(rows))
 
 
-def calibrate_stretches(
-    stretches: Stretch, parameters: Sequence[str] | None = None, *, fitted: np.ndarray | None = None
-) -> DriveCalibration:
+def calibrate_stretches(stretches: Stretch, parameters: Sequence[str] | None = None) -> Calibration:
     """The same from stretches of data, as `drive_stretches` makes them.
 
     Parameters
@@ -125,67 +94,68 @@ def calibrate_stretches(
         Stacked stretches.
     parameters : sequence of str, optional
         Names out of `DRIVE_PARAMETERS`; all by default.
-    fitted : ndarray, optional
-        Which stretches to fit; the others are held out. All by default.
 
     Returns
     -------
-    calibration : DriveCalibration
-        Values, standard deviations, and what the drive does not determine.
+    calibration : Calibration
+        Nothing is held out.
 
     Raises
     ------
     ValueError
         If a name is unknown or nothing is to be fitted.
     """
-    names = tuple(DRIVE_PARAMETERS) if parameters is None else tuple(parameters)
-    unknown = sorted(set(names) - set(DRIVE_PARAMETERS))
-    if unknown or not names or len(set(names)) < len(names):
-        raise ValueError(f"parameters must be different names out of {', '.join(DRIVE_PARAMETERS)}, got {names}")
-    fitted = np.ones(stretches.f.shape[0], bool) if fitted is None else fitted
+    names = require_parameters(DRIVE_PARAMETERS if parameters is None else parameters, "drive")
+    return _calibrated(stretches, names, np.ones(stretches.f.shape[0], bool))[0]
+
+
+def _calibrated(
+    stretches: Stretch, names: Sequence[str], fitted: np.ndarray
+) -> tuple[Calibration, dict[str, list[float]]]:
+    """The fit to some stretches, and the residuals of each kind on the others with nominal and with fitted values."""
     if not fitted.any():
         raise ValueError(f"no stretch of {STRETCH:g} s lies before the end of the fit")
-    chosen = np.array([name in names for name in DRIVE_PARAMETERS])
-    prior = np.array([row[0] for row in DRIVE_PARAMETERS.values()])
-    prior_std = np.where(chosen, [row[1] for row in DRIVE_PARAMETERS.values()], 0.0)
+    names = list(names)
+    prior = np.array([constant.nominal for constant in DRIVE_PARAMETERS.values()])
+    prior_std = np.array([name in names and constant.spread for name, constant in DRIVE_PARAMETERS.items()], float)
     with jax.enable_x64(True), stages("calibration by driving") as stage:
         fit, noise = _fit_drive(_seen(stretches, fitted), prior, prior_std, stage)
         stage("what the drive determines")
-        rows = np.flatnonzero(chosen)
-        found = identify_information(fit.information[np.ix_(rows, rows)], prior_std[rows], names=_ordered(names))
-        sizes = {}
+        rows = np.flatnonzero(prior_std)
+        order = tuple(np.array(list(DRIVE_PARAMETERS))[rows].tolist())
+        found = identify_information(fit.information[np.ix_(rows, rows)], prior_std[rows], names=order)
+        undetermined = describe_undetermined(found)
+        sizes: dict[str, list[float]] = {}
         if not fitted.all():
             rest = _with_noise(_seen(stretches, ~fitted), noise / np.asarray(_FIRST_STD))
             for name, at in (("nominal", prior), ("fitted", fit.shared)):
                 stage(f"stretches that were held out, with {name} values")
                 again = _solve(rest, at, 0 * prior_std, (at, _own0(rest)))
-                left = _by_group(again.residuals, rest)
-                sizes[name] = [float(np.sqrt(np.mean(r[r != 0] ** 2))) if r.any() else np.nan for r in left]
-    values = fit.shared[rows]
+                for kind, r in zip(GROUPS, _by_group(again.residuals, rest), strict=True):
+                    sizes.setdefault(kind, []).append(float(np.sqrt(np.mean(r[r != 0] ** 2))) if r.any() else np.nan)
     table = pd.DataFrame(
         {
-            "value": values,
+            "value": fit.shared[rows],
             "std": np.asarray(found.std),
-            "unit": [DRIVE_PARAMETERS[name][2] for name in found.names],
+            "unit": [DRIVE_PARAMETERS[name].unit for name in order],
             "prior": prior[rows],
             "prior_std": prior_std[rows],
-            "shift": (values - prior[rows]) / prior_std[rows],
-            "bits": np.asarray(found.gained),
         },
-        index=pd.Index(found.names, name="parameter"),
+        index=pd.Index(order),
     )
-    held_out = pd.DataFrame()
-    if sizes:
-        held_out = pd.DataFrame(sizes, index=pd.Index(GROUPS, name="residuals"))
-        held_out["worse"] = held_out["fitted"] > held_out["nominal"]
-    return DriveCalibration(
-        table=table,
-        identification=found,
-        noise=pd.Series(noise, GROUPS, name="std"),
+    covariance, std = np.asarray(found.covariance), np.asarray(found.std)
+    calibration = Calibration(
+        method="drive",
+        table=constants_table(table).loc[names],
+        correlation=pd.DataFrame(covariance / np.outer(std, std), order, order).loc[names, names],
+        absorbed=pd.DataFrame(index=names),
+        undetermined=(*([] if fit.converged else [NOT_CONVERGED]), *undetermined),
+        held_out=pd.DataFrame(),
+        noise=noise_levels(dict(zip(GROUPS, noise, strict=True))),
         nis=float(fit.nis),
         converged=bool(fit.converged),
-        held_out=held_out,
     )
+    return calibration, sizes
 
 
 def _fit_drive(
@@ -414,10 +384,6 @@ def _with_room(stretches: Stretch, epochs: int, samples: int) -> Stretch:
             for name, size in room.items()
         },
     )
-
-
-def _ordered(names: Sequence[str]) -> tuple[str, ...]:
-    return tuple(name for name in DRIVE_PARAMETERS if name in names)
 
 
 def _starts(t: np.ndarray) -> np.ndarray:

@@ -95,14 +95,14 @@ def drive_information(
         gnss_std=jnp.broadcast_to(levels[:2], (*v_gnss.shape[:2], 2)),
         t_wheel=times(wheel),
         wheel=speed,
-        apart=DRIVE_PARAMETERS["track_width"][0] * turning,
+        apart=DRIVE_PARAMETERS["track_width"].nominal * turning,
         wheel_spread=jnp.zeros_like(speed),
         wheel_std=jnp.broadcast_to(levels[2:], (*speed.shape, 4)),
     )
     states = own_states(_STEPS)
     own = jnp.zeros((stretches, states), levels.dtype).at[:, 3:6].set(v_gnss[:, 0])
     own_std = jnp.ones(states, levels.dtype).at[:3].set(0.5).at[3:6].set(5.0)
-    nominal = jnp.asarray([row[0] for row in DRIVE_PARAMETERS.values()], levels.dtype)
+    nominal = jnp.asarray([constant.nominal for constant in DRIVE_PARAMETERS.values()], levels.dtype)
     return minutes * shared_information(drive_residuals, data, nominal, own, own_std)
 
 
@@ -125,7 +125,7 @@ def manoeuvre_gains(manoeuvres: Manoeuvres, *, minutes: int = 5, rate: int = 1) 
     added : (6, 19)
         Change of these for each of `CHANGES`, from the gradient.
     """
-    prior_std = jnp.asarray([row[1] for row in DRIVE_PARAMETERS.values()])
+    prior_std = jnp.asarray([constant.spread for constant in DRIVE_PARAMETERS.values()])
 
     def bits(x: jax.Array) -> jax.Array:
         plan = Manoeuvres(**dict(zip(CHANGES, x, strict=True)))
@@ -160,8 +160,8 @@ def driving_protocol(bits: ArrayLike, added: ArrayLike, wanted: tuple[str, ...] 
     lines = []
     for column in columns:
         best = max(range(len(advice)), key=lambda row: gains[row][column])
-        std = DRIVE_PARAMETERS[names[column]][1] * 2 ** -known[column]
-        state = f"{names[column]}: std {std:.2g} {DRIVE_PARAMETERS[names[column]][2]}"
+        std = DRIVE_PARAMETERS[names[column]].spread * 2 ** -known[column]
+        state = f"{names[column]}: std {std:.2g} {DRIVE_PARAMETERS[names[column]].unit}"
         if gains[best][column] < 0.02:
             lines.append(f"{state}; no change of the driving helps it.")
         else:

@@ -3,15 +3,17 @@
 import json
 import re
 import tomllib
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
 
+import jax
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.identifiability import Identification, identify_information
+from altijax.calibration.parameters import CONSTANTS, triads
 
 # Less than this is no difference worth a word.
 _WORSE = 1.01
@@ -27,8 +29,8 @@ class Calibration:
     method : str
         Method whose misfit was minimised, or "drive" where the sensors were made to agree.
     table : DataFrame
-        One row a constant: value, std (from data and prior), unit, prior (its mean), prior_std, and shift, by how many
-        standard deviations of the prior the value has moved.
+        One row a constant: value, std (from data and prior), unit, prior (its mean), prior_std, shift, by how many
+        standard deviations of the prior the value has moved, and bits, the information gained on it.
     correlation : DataFrame
         Correlation between the constants.
     absorbed : DataFrame
@@ -41,6 +43,14 @@ class Calibration:
         and the last one that was held out (``end``), in s on the recording's time axis; the root mean square misfit
         with nominal and with fitted constants on both parts, NaN where there was nothing; and whether the constants
         made it worse, by more than 1 %, where they were not fitted.
+    noise : Series
+        Of "drive", the standard deviation of each kind of observation as it was found, m/s; it includes their
+        correlation. Empty otherwise.
+    nis : float
+        Normalised innovation squared per degree of freedom with that noise; NaN where there is none.
+    converged : bool
+        False where the steps of the fit were used up, as on a drive that leaves much open: then the bars say too
+        little.
     """
 
     method: str
@@ -49,11 +59,18 @@ class Calibration:
     absorbed: pd.DataFrame
     undetermined: tuple[str, ...]
     held_out: pd.DataFrame
+    noise: pd.Series = field(default_factory=lambda: noise_levels({}))
+    nis: float = float("nan")
+    converged: bool = True
 
     @property
     def values(self) -> pd.Series:
         """Value by name."""
         return self.table["value"]
+
+    def known(self) -> dict[str, float]:
+        """Value by name, in plain numbers."""
+        return dict(zip(map(str, self.values.index), self.values.tolist(), strict=True))
 
     @property
     def std(self) -> pd.Series:
@@ -66,9 +83,19 @@ class Calibration:
         return self.correlation * np.outer(self.std, self.std)
 
     @property
+    def identification(self) -> Identification:
+        """Which directions of the constants the data determine, and the information on each."""
+        units = self.table["prior_std"].to_numpy(float)
+        # By the covariance's own values, for the inverse of one that is small along some directions loses the others.
+        known, directions = np.linalg.eigh(self.covariance.to_numpy(float) / np.outer(units, units))
+        information = directions * (1 / np.clip(known, np.finfo(float).tiny, 1) - 1) @ directions.T
+        with jax.enable_x64(True):
+            return identify_information(information / np.outer(units, units), units, tuple(map(str, self.table.index)))
+
+    @property
     def std_with_absorbed(self) -> pd.Series:
-        """Standard deviation by name where the constants that were left at nominal may be off as `PARAMETERS` says."""
-        presumed = PARAMETERS["uncertainty"].reindex(self.absorbed.columns).to_numpy(float)
+        """Standard deviation by name where the constants that were left at nominal may be off as `CONSTANTS` says."""
+        presumed = np.array([CONSTANTS[name].spread for name in self.absorbed.columns])
         taken_up = np.square(self.absorbed.to_numpy(float) * presumed).sum(1)
         return np.sqrt(self.std**2 + pd.Series(taken_up, self.absorbed.index).reindex(self.std.index, fill_value=0.0))
 
@@ -82,6 +109,8 @@ class Calibration:
         """
         lines = ["# Calibration by AltiJAX: true = measured / scale - bias; see altijax.Calibration"]
         lines += [_line("method", self.method), _line("undetermined", list(self.undetermined))]
+        lines += [_line("nis", self.nis), _line("converged", self.converged)]
+        lines += ["", "[noise]", *(_line(str(kind), level) for kind, level in self.noise.items())]
         for name, row in self.table.iterrows():
             lines += ["", f"[constants.{_key(str(name))}]", *(_line(key, row[key]) for key in _TABLE)]
         for title, frame in (("correlation", self.correlation), ("absorbed", self.absorbed)):
@@ -129,21 +158,30 @@ class Calibration:
                 table=constants_table(pd.DataFrame.from_dict(rows, orient="index", columns=list(_TABLE))),
                 undetermined=tuple(found["undetermined"]),
                 held_out=held_out_table(found.get("held_out", [])),
+                noise=noise_levels(found.get("noise", {})),
+                nis=found.get("nis", cls.nis),
+                converged=found.get("converged", cls.converged),
                 **frames,
             )
         except (tomllib.TOMLDecodeError, KeyError) as error:
             raise ValueError(f"{path} is not a calibration that `Calibration.save` wrote: {error!r}") from error
 
     def __repr__(self) -> str:
-        parts = [f"Calibration of {self.method!r}", self.table.to_string(), *self.undetermined]
+        parts = [f"Calibration of {self.method!r}", self.table.to_string(), *self._noise(), *self.undetermined]
         return "\n".join(
             [*parts, *self._judgement(), self.held_out.T.to_string() if len(self.held_out) else ""]
         ).strip()
 
     def _repr_html_(self) -> str:
         parts = [f"<p>Calibration of <b>{self.method}</b></p>", self.table.to_html(border=0)]
-        parts += [f"<p>{sentence}</p>" for sentence in (*self.undetermined, *self._judgement())]
+        parts += [f"<p>{sentence}</p>" for sentence in (*self._noise(), *self.undetermined, *self._judgement())]
         return "".join([*parts, self.held_out.round(4).to_html(border=0) if len(self.held_out) else ""])
+
+    def _noise(self) -> list[str]:
+        if self.noise.empty:
+            return []
+        levels = ", ".join(f"{kind} {level:.3g}" for kind, level in self.noise.items())
+        return [f"Noise found, m/s: {levels}; normalised innovation squared {self.nis:.2f}."]
 
     def _judgement(self) -> list[str]:
         if not len(self.held_out):
@@ -163,10 +201,16 @@ def constants_table(table: pd.DataFrame) -> pd.DataFrame:
     Returns
     -------
     table : DataFrame
-        The same with the shift, its index called parameter.
+        The same with shift and bits, its index called parameter.
     """
     table = table.loc[:, list(_TABLE)].astype(dict.fromkeys(("value", "std", "prior", "prior_std"), float))
-    return table.assign(shift=(table["value"] - table["prior"]) / table["prior_std"]).rename_axis("parameter")
+    shift, bits = (table["value"] - table["prior"]) / table["prior_std"], np.log2(table["prior_std"] / table["std"])
+    return table.assign(shift=shift, bits=bits).rename_axis("parameter")
+
+
+def noise_levels(levels: Mapping[str, float]) -> pd.Series:
+    """`Calibration.noise` of standard deviations by kind of observation."""
+    return pd.Series(dict(levels), name="std", dtype=float)
 
 
 def worse_where_held_out(calibration: Calibration) -> str:
@@ -197,14 +241,13 @@ def correct_imu(imu: pd.DataFrame, calibration: Calibration | None) -> pd.DataFr
     imu : DataFrame
         true = measured / scale - bias; the same table where nothing is known of these.
     """
-    known = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
-    changed = {}
-    for letter, sensor in (("a", "accelerometer"), ("g", "gyro")):
-        for axis in "xyz":
-            bias = known.get(f"{sensor}_bias_{axis}", 0.0)
-            scale = known.get(f"{sensor}_scale", 1.0) * known.get(f"{sensor}_scale_{axis}", 1.0)
-            if (bias, scale) != (0.0, 1.0) and f"{letter}{axis}" in imu:
-                changed[f"{letter}{axis}"] = imu[f"{letter}{axis}"] / scale - bias
+    known = triads({} if calibration is None else calibration.known(), np)
+    scales = np.append(known.accelerometer_scale, known.gyro_scale).tolist()
+    biases = np.append(known.accelerometer_bias, known.gyro_bias).tolist()
+    constants = zip(("ax", "ay", "az", "gx", "gy", "gz"), scales, biases, strict=True)
+    changed = {
+        name: imu[name] / scale - bias for name, scale, bias in constants if (scale, bias) != (1.0, 0.0) and name in imu
+    }
     return imu.assign(**changed)
 
 

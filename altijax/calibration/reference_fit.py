@@ -6,15 +6,15 @@ counted as one as far as they are correlated, and the fit repeated until both ag
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.identifiability import describe_undetermined, identify_information
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.identifiability import describe_undetermined
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, constants_table
 from altijax.calibration.serial_correlation import statistical_inefficiency
 from altijax.least_squares import levenberg_marquardt
@@ -217,8 +217,6 @@ def calibration_from(
         raise ValueError(f"{', '.join(idle)}: changes nothing in method {method!r} on these recordings; leave it out")
     known = prior.loc[names]
     units = known["uncertainty"].to_numpy(float)
-    information = np.linalg.inv(covariance) - np.eye(len(names))
-    found = identify_information(information / np.outer(units, units), units, tuple(names))
     std = np.sqrt(np.diag(covariance))
     table = pd.DataFrame(
         {
@@ -229,14 +227,16 @@ def calibration_from(
             "prior_std": units,
         }
     )
-    return Calibration(
+    found = Calibration(
         method=method,
         table=constants_table(table),
         correlation=pd.DataFrame(covariance / np.outer(std, std), names, names),
         absorbed=pd.DataFrame(index=names) if absorbed is None else absorbed,
-        undetermined=tuple(describe_undetermined(found)),
+        undetermined=(),
         held_out=held_out,
     )
+    with jax.enable_x64(True):
+        return replace(found, undetermined=tuple(describe_undetermined(found.identification)))
 
 
 def _size(r: np.ndarray) -> float:

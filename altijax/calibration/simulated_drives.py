@@ -9,6 +9,7 @@ from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
 from altijax.calibration.drive_model import DRIVE_PARAMETERS
+from altijax.calibration.parameters import triads
 from altijax.constants import STANDARD_GRAVITY
 from altijax.doppler import DopplerReceiver, doppler_velocity
 from altijax.motions import Readings, ideal_readings, road_pose
@@ -138,7 +139,8 @@ def recorded_drive(
     p = dict(zip(DRIVE_PARAMETERS, jnp.asarray(parameters, t.dtype), strict=True))
     keys = jax.random.split(key, 4)
     dt = t[1] - t[0]
-    mounting = euler_to_matrix(jnp.stack([0 * dt, p["mounting_pitch"], p["mounting_yaw"]]))
+    imu = triads(p)
+    mounting = euler_to_matrix(imu.mounting)
     acceleration = jnp.gradient(readings.speed, dt)
     squat = p["weight_transfer"] / STANDARD_GRAVITY * acceleration
     body = euler_to_matrix(jnp.stack([0 * squat, squat, 0 * squat], -1))
@@ -152,8 +154,7 @@ def recorded_drive(
     velocity = readings.velocity + jnp.einsum("tij,tjk,tk->ti", readings.C_nb, body, at_antenna)
     turning = w[:, 2]
     f, w = f @ mounting, w @ mounting
-    bias, rate_bias = (jnp.stack([p[f"{kind}_bias_{axis}"] for axis in "xyz"]) for kind in ("accelerometer", "gyro"))
-    accelerometer = replace(accelerometer, bias=bias, scale=p["accelerometer_scale"])
+    accelerometer = replace(accelerometer, bias=imu.accelerometer_bias, scale=imu.accelerometer_scale)
     t_gnss, v_gnss, valid = doppler_velocity(
         replace(receiver, latency=p["gnss_delay"]), t, velocity, epochs=epochs, key=keys[2]
     )
@@ -168,13 +169,7 @@ def recorded_drive(
     return {
         "t": t,
         "f": accelerometer_output(accelerometer, f, dt, key=keys[0]),
-        "w": gyro_output(
-            replace(gyro, bias=rate_bias, scale=jnp.stack([1 + 0 * dt, 1 + 0 * dt, p["gyro_scale_z"]])),
-            w,
-            f,
-            dt,
-            key=keys[1],
-        ),
+        "w": gyro_output(replace(gyro, bias=imu.gyro_bias, scale=imu.gyro_scale), w, f, dt, key=keys[1]),
         "t_gnss": t_gnss,
         "v_gnss": jnp.where(valid[:, None], v_gnss, jnp.nan),
         "t_wheel": t_wheel,

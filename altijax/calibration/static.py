@@ -27,7 +27,9 @@ POSITION_PARAMETERS = (
 """Order of the parameters in the covariance and Jacobian of `fit_accelerometer_positions`."""
 
 POSITION_UNCERTAINTY = (0.5, 0.5, 0.5, 0.03, 0.03, 0.03, 0.02, 0.02, 0.02)
-"""Standard deviations of the same for a consumer's sensor that nobody has calibrated: m/s^2, 1, rad (MPU-6050)."""
+"""Standard deviations of the same for a consumer's sensor that nobody has calibrated: m/s^2, 1, rad (MPU-6050).
+
+They are not those of `altijax.calibration.parameters.CONSTANTS`: of a sensor alone its whole tolerance counts."""
 
 _MODELS = {"bias": 3, "bias and scale": 6, "bias, scale and misalignment": 9}
 

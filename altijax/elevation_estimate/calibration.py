@@ -8,7 +8,7 @@ import jax
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
 from altijax.calibration.reference_fit import ReferenceFit, calibration_from, fit_to_reference, stepwise_fit
 from altijax.drives import Drive, drive_arrays, reference_heights, start_of

@@ -5,6 +5,7 @@ and what is left to compile and to differentiate, arithmetic sample by sample an
 readings end.
 """
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -16,7 +17,7 @@ import numpy as np
 
 from altijax import _safe
 from altijax.altitude import slope_sine, vertical_acceleration
-from altijax.calibration.parameters import ACCEPTED, PARAMETERS
+from altijax.calibration.parameters import ACCEPTED, CONSTANTS, triads
 from altijax.drives import Array, Drive
 from altijax.padding import bucket, padded
 from altijax.rotations import euler_to_matrix
@@ -25,10 +26,10 @@ from altijax.signals import cumulative_integral
 
 ELEVATION_METHODS = ("shirai", "slope", "fused")
 
-NOMINAL = {str(name): float(value) for name, value in PARAMETERS["nominal"].dropna().items()}
-UNCERTAINTY = {str(name): float(value) for name, value in PARAMETERS["uncertainty"].items()}
+NOMINAL = {name: constant.nominal for name, constant in CONSTANTS.items() if not math.isnan(constant.nominal)}
+UNCERTAINTY = {name: constant.spread for name, constant in CONSTANTS.items()}
 
-CONSTANTS = tuple(ACCEPTED["fused"])
+NAMES = tuple(ACCEPTED["fused"])
 """All that an elevation depends on, whatever its method."""
 
 _FIRST_SECOND = 1.0
@@ -111,12 +112,12 @@ def _linearised_at(
     values: Mapping[str, float], drive: Drive, names: Sequence[str], method: str
 ) -> tuple[dict[str, np.ndarray], np.ndarray]:
     at = {**NOMINAL, "initial_vertical_speed": np.nan, **values}
-    directions = np.eye(len(CONSTANTS))[[CONSTANTS.index(name) for name in names]]
+    directions = np.eye(len(NAMES))[[NAMES.index(name) for name in names]]
     with jax.enable_x64(True):
         return jax.tree.map(
             np.asarray,
             _linearised(
-                np.array([at[name] for name in CONSTANTS], float),
+                np.array([at[name] for name in NAMES], float),
                 padded(directions, bucket(len(names), _LEAST_NAMES), 0.0),
                 _readings(drive, at["wheel_delay" if drive.from_wheel else "gnss_delay"]),
                 "slope" if method == "fused" else method,
@@ -165,10 +166,10 @@ def _speed_at(t: np.ndarray, t_speed: np.ndarray, speed: np.ndarray) -> tuple[np
 def _linearised(
     x: jax.Array, directions: jax.Array, readings: _Readings, method: str
 ) -> tuple[dict[str, jax.Array], jax.Array]:
-    """Elevation and the rest for all `CONSTANTS`, and its derivatives (directions, time)."""
+    """Elevation and the rest for all `NAMES`, and its derivatives (directions, time)."""
 
     def height(x: jax.Array) -> tuple[jax.Array, dict[str, jax.Array]]:
-        found = _elevation(dict(zip(CONSTANTS, x, strict=True)), readings, method)
+        found = _elevation(dict(zip(NAMES, x, strict=True)), readings, method)
         return found["elevation"], found
 
     _, columns, found = jax.vmap(
@@ -178,11 +179,9 @@ def _linearised(
 
 
 def _elevation(value: dict[str, jax.Array], readings: _Readings, method: str) -> dict[str, jax.Array]:
-    scale = value["accelerometer_scale"] * jnp.stack([value[f"accelerometer_scale_{axis}"] for axis in "xyz"])
-    bias = jnp.stack([value[f"accelerometer_bias_{axis}"] for axis in "xyz"])
-    f_s = readings.f / scale[:, None] - bias[:, None]
-    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), value["mounting_pitch"], value["mounting_yaw"]]))
-    f_x, f_y, f_z = mounting @ f_s
+    imu = triads(value)
+    f_s = readings.f / imu.accelerometer_scale[:, None] - imu.accelerometer_bias[:, None]
+    f_x, f_y, f_z = euler_to_matrix(imu.mounting) @ f_s
     # A sensor ahead of the point that moves along the path is drawn backwards in turns.
     bias = value["yaw_rate_bias"]
     f_x = f_x + value["lever_arm"] * (readings.yaw_rate_squared - 2 * bias * readings.yaw_rate + bias**2)

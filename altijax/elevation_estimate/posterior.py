@@ -11,7 +11,7 @@ from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import minimize
 
 from altijax.drives import Array, Drive
-from altijax.elevation_estimate.model import CONSTANTS, elevation_and_sensitivity
+from altijax.elevation_estimate.model import NAMES, elevation_and_sensitivity
 from altijax.elevation_estimate.smoother import (
     ElevationNoise,
     gaussian_update,
@@ -138,7 +138,7 @@ def elevation_posterior(
         likely, *moments = _over_levels(*levels, system, noise, base)
         state, state_covariance = map(np.asarray, moments)
         mean = constants.mean + state[: len(names)]
-    rows = np.r_[: len(names), len(CONSTANTS) : len(CONSTANTS) + n]
+    rows = np.r_[: len(names), len(NAMES) : len(NAMES) + n]
     reading = np.hstack([system.sensitivity[:n, : len(names)], np.eye(n)])
     change = system.height[:n] + reading @ state[rows] - found["elevation"][knots]
     covariance = state_covariance[np.ix_(rows, rows)]
@@ -176,7 +176,7 @@ def _linearised(
     squared = np.gradient(smooth, t, edge_order=2) ** 2 + (smooth * drive.yaw_rate) ** 2
     way, horizontal, squares = (cumulative_trapezoid(x, t, initial=0) for x in (speed, level, squared))
     size = bucket(knots.size - 1, _LEAST_STEPS) + 1
-    unknowns = partial(padded, size=len(CONSTANTS), fill=0.0, axis=1)
+    unknowns = partial(padded, size=len(NAMES), fill=0.0, axis=1)
     at_knots = partial(padded, size=size, fill=0.0)
     second = None
     if method == "fused":
@@ -197,7 +197,7 @@ def _linearised(
         unsupported=at_knots(np.cumsum(unsupported)[knots]),
         acceleration=padded(np.sqrt(np.maximum(mean_square, 0)), size - 1),
         gravity=drive.gravity,
-        spread=padded(unknowns(prior.covariance), len(CONSTANTS), 0.0),
+        spread=padded(unknowns(prior.covariance), len(NAMES), 0.0),
         height=at_knots(at_prior[knots]),
         sensitivity=at_knots(unknowns(sensitivity[knots])),
         second=second,

@@ -2,17 +2,12 @@
 
 from dataclasses import replace
 
-import numpy as np
-import pandas as pd
-
-from altijax.calibration.parameters import ACCEPTED
+from altijax.calibration.priors import prior_of
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import Drive, imu_of, wheel_pair
-from altijax.elevation_estimate.model import NOMINAL, uncertain_constants, vertical_speed_at_start
+from altijax.elevation_estimate.model import NAMES, uncertain_constants, vertical_speed_at_start
 from altijax.elevation_estimate.posterior import Constants
 from altijax.recordings import Recording
-
-_OWN = set(ACCEPTED["fused"])
 
 
 def prior_constants(
@@ -35,28 +30,18 @@ def prior_constants(
     Returns
     -------
     constants : Constants
-        A calibrated constant has taken up what the others, left at nominal, did where it was fitted: it is off by its
-        own error and, against each of them, by what it absorbed.
+        Those calibrated first; see `prior_of`.
     """
     fixed = {} if fixed is None else fixed
-    values = (
-        {} if calibration is None else {str(name): float(x) for name, x in calibration.values.items() if name in _OWN}
-    )
-    names = [name for name in values if name not in fixed]
+    known = {} if calibration is None else calibration.known()
+    values = {name: value for name, value in known.items() if name in NAMES and name not in fixed}
     others = {name: std for name, std in uncertain_constants(drive, method).items() if name not in values | fixed}
-    covariance = np.diag(np.square([*np.zeros(len(names)), *others.values()]))
-    if calibration is not None:
-        std = calibration.std[names].to_numpy()
-        own = calibration.correlation.loc[names, names].to_numpy() * np.outer(std, std)
-        absorbed = calibration.absorbed if calibration.method == method else pd.DataFrame()
-        gain = absorbed.reindex(index=names, columns=list(others)).fillna(0.0).to_numpy()
-        through = np.vstack([gain, np.eye(len(others))])
-        covariance = through @ np.diag(np.square(list(others.values()))) @ through.T
-        covariance[: len(names), : len(names)] += own
-    mean, order = NOMINAL | values, (*names, *others)
+    names = (*values, *others)
+    mean, covariance = prior_of(names, calibration, others)
     if "initial_vertical_speed" in others:
-        mean["initial_vertical_speed"] = vertical_speed_at_start({**values, **fixed}, drive, order, "shirai")
-    return Constants(names=order, mean=np.array([mean[name] for name in order]), covariance=covariance)
+        at = {**values, **fixed}
+        mean[names.index("initial_vertical_speed")] = vertical_speed_at_start(at, drive, names, "shirai")
+    return Constants(names=names, mean=mean, covariance=covariance)
 
 
 def with_corrected_turns(recording: Recording, calibration: Calibration | None) -> Recording:

@@ -13,7 +13,7 @@ import jax
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import PARAMETERS
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table
 from altijax.calibration.reference_fit import Found, ReferenceFit, calibration_from, fit_to_reference, weighted_fit
 from altijax.drives import imu_of

@@ -11,6 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
+from altijax.calibration.parameters import triads
 from altijax.constants import STANDARD_GRAVITY
 from altijax.elevation_estimate.estimates import estimate_elevation
 from altijax.elevation_estimate.model import NOMINAL, UNCERTAINTY
@@ -76,7 +77,8 @@ def hilly_drive(seed: int, car: str = "presumed") -> Recording:
             rng.uniform(8, 18, 2),
         )
         constants = {name: NOMINAL[name] + std * rng.normal() for name, std in SPREAD.items()}
-        mounting = np.asarray(_matrix(np.array([0.0, constants["mounting_pitch"], constants["mounting_yaw"]])))
+        known = triads(constants, np)
+        mounting = np.asarray(_matrix(known.mounting))
     truth = jax.tree.map(np.asarray, truth)
     f, speed, yaw_rate = truth.f_b.copy(), truth.speed, truth.w_b[:, 2]
     f[:, 0] *= 1 + constants["weight_transfer"]
@@ -86,9 +88,7 @@ def hilly_drive(seed: int, car: str = "presumed") -> Recording:
     f[:, 2] += noise.rectified * lasting(rng, f.shape[0], RATE * float(noise.rectified_time))
     f[:, 0] -= constants["lever_arm"] * yaw_rate**2
     f = f @ mounting
-    for i, axis in enumerate("xyz"):
-        scale = constants["accelerometer_scale"] * (constants["accelerometer_scale_x"] if axis == "x" else 1.0)
-        f[:, i] = (f[:, i] + constants[f"accelerometer_bias_{axis}"]) * scale
+    f = (f + known.accelerometer_bias) * known.accelerometer_scale
     f += 0.03 * rng.normal(size=f.shape)
     index = pd.Index(truth.t, name="t")
     imu = pd.DataFrame(f, index=index, columns=["ax", "ay", "az"])

@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.calibration.parameters import ACCEPTED, PARAMETERS
+from altijax.calibration.parameters import ACCEPTED, triads
+from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, held_out_row, held_out_table
 from altijax.calibration.reference_fit import Found, calibration_from, fit_to_reference, weighted_fit
 from altijax.calibration.shared_parameters import fit_shared
@@ -23,7 +24,6 @@ from altijax.drives import gravity_at, imu_of, start_of
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 from altijax.rotations import euler_to_matrix
-from altijax.sensors import Accelerometer, Gyro, correct_accelerometer, correct_gyro
 from altijax.series import interpolated, means_between
 from altijax.speed import speed_with_aided_roll, speed_with_roll, speed_without_roll
 from altijax.speed_estimate.estimates import (
@@ -35,7 +35,7 @@ from altijax.speed_estimate.estimates import (
     run_filter,
     samples_between,
 )
-from altijax.speed_estimate.model import STATES, state_names
+from altijax.speed_estimate.model import OF_CONSTANTS, STATES, state_names
 from altijax.speed_estimate.steps import aid_of, drive_in_steps, initial_state, speed_of
 from altijax.stages import stages, tracked
 
@@ -54,8 +54,7 @@ _NEAR = 1.0
 _OWN_STD = (1.0, 0.1)
 # The smallest numbers of stretches, and of speeds of an aid, that arrays are filled up to.
 _FEW, _SPEEDS = 4, 1024
-# The filter's names of constants that it sees from the other side.
-_MIRRORED = {"mounting_yaw": "travel_yaw"}
+_STATE_OF = {constant: (state, sign) for state, (constant, sign) in OF_CONSTANTS.items()}
 
 Array = jax.Array | np.ndarray
 
@@ -263,14 +262,10 @@ def _solve(
 
 
 def _dead_reckoned(values: dict[str, jax.Array], own: jax.Array, stretch: _Stretches, method: str) -> jax.Array:
-    def triad(kind: str) -> jax.Array:
-        return jnp.stack([values[f"{kind}_{axis}"] for axis in "xyz"])
-
-    scale = values["accelerometer_scale"] * triad("accelerometer_scale")
-    f = correct_accelerometer(Accelerometer(bias=triad("accelerometer_bias"), scale=scale), stretch.f)
-    w = correct_gyro(Gyro(bias=triad("gyro_bias"), scale=triad("gyro_scale")), stretch.w, f)
-    angles = [values[name] for name in ("mounting_pitch", "mounting_yaw")]
-    mounting = euler_to_matrix(jnp.stack([jnp.zeros(()), *angles]))
+    imu = triads(values)
+    f = stretch.f / imu.accelerometer_scale - imu.accelerometer_bias
+    w = stretch.w / imu.gyro_scale - imu.gyro_bias
+    mounting = euler_to_matrix(imu.mounting)
     (f_x, f_y, _), (_, w_y, w_z) = (f @ mounting.T).T, (w @ mounting.T).T
     start = own[0], own[1], stretch.gravity, _STEP
     if method == "conventional":
@@ -290,8 +285,7 @@ def _from_filter(
     method: str,
 ) -> Calibration:
     """One drive after the other, each beginning with what the ones before have left; the reference as the aid."""
-    states = [_MIRRORED.get(name, name) for name in names]
-    signs = np.array([-1.0 if name in _MIRRORED else 1.0 for name in names])
+    states, signs = zip(*(_STATE_OF[name] for name in names), strict=True)
     rows = [state_names(AUTO_SENSORS).index(state) for state in states]
     prior = PARAMETERS.copy()
     prior.loc[names, "uncertainty"] = [STATES[state] for state in states]

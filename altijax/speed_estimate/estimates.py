@@ -248,7 +248,7 @@ def _before_the_first(drive: SpeedDrive, initial: tuple[float, float], sensors: 
     first = first_state(
         *(drive.f_steps[0], drive.w_steps[0], *map(np.float64, (*initial, drive.gravity))),
         sensors=sensors,
-        states_std=drive.states_std,
+        states_covariance=drive.states_covariance,
     )
     return jax.tree.map(lambda x: np.stack([np.asarray(x)] * _bank_size(sensors)), first)
 

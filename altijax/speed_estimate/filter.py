@@ -102,7 +102,7 @@ def first_state(
     pitch0: ArrayLike,
     gravity: ArrayLike,
     sensors: str = "2+2",
-    states_std: ArrayLike | None = None,
+    states_covariance: ArrayLike | None = None,
 ) -> SpeedState:
     """What `filter_speed` knows before the first step.
 
@@ -120,8 +120,8 @@ def first_state(
         Magnitude of gravity.
     sensors : {"2+2", "2+3", "6"}, optional
         Accelerometers + gyros to use.
-    states_std : array, optional
-        Standard deviation of each of `STATES`; their own values by default.
+    states_covariance : array, optional
+        Covariance of `STATES`; by default their own values are standard deviations.
 
     Returns
     -------
@@ -140,11 +140,13 @@ def first_state(
     speed0, pitch0, gravity = (require_shape(name, value, ()).astype(f_b.dtype) for name, value in scalars.items())
     roll0 = jnp.clip((f_b[1] - speed0 * w_b[2]) / gravity, -0.5, 0.5)
     known = {"speed": speed0, "pitch": pitch0, "roll": roll0, "resting_roll": roll0}
-    all_std = jnp.asarray(list(STATES.values()) if states_std is None else states_std, f_b.dtype)
-    all_std = require_shape("states_std", all_std, (len(STATES),))
+    if states_covariance is None:
+        states_covariance = jnp.diag(jnp.asarray(list(STATES.values()), f_b.dtype) ** 2)
+    covariance = require_shape("states_covariance", states_covariance, (len(STATES), len(STATES))).astype(f_b.dtype)
+    rows = jnp.asarray([list(STATES).index(name) for name in names])
     return SpeedState(
         states=jnp.stack([known.get(name, jnp.zeros_like(speed0)) for name in names]),
-        covariance=jnp.diag(all_std[jnp.asarray([list(STATES).index(name) for name in names])] ** 2),
+        covariance=covariance[rows[:, None], rows],
     )
 
 
@@ -164,7 +166,7 @@ def filter_speed(
     dt: ArrayLike,
     noise: SpeedNoise | None = None,
     sensors: str = "2+2",
-    states_std: ArrayLike | None = None,
+    states_covariance: ArrayLike | None = None,
     counted: ArrayLike | None = None,
     start: SpeedState | None = None,
 ) -> SpeedTrack:
@@ -209,15 +211,15 @@ def filter_speed(
         Noise levels; `fit_speed_noise` finds those of a drive.
     sensors : {"2+2", "2+3", "6"}, optional
         Accelerometers + gyros to use.
-    states_std : array, optional
-        Standard deviation of each of `STATES` before the first sample, in their order, used or not: that of a
-        calibration, say. Their own values by default.
+    states_covariance : array, optional
+        Covariance of `STATES` before the first sample, in their order, used or not: that of a calibration, say. By
+        default their own values are standard deviations.
     counted : (time,), optional
         Not zero where a step counts, by default everywhere; elsewhere the states are held and the speed is zero. So
         arrays may be filled up with copies of their first and last steps.
     start : SpeedState, optional
         What is known before the first step that counts: the last states and covariance of an earlier part of the drive.
-        By default `first_state`, which alone asks for `speed0`, `pitch0` and `states_std`.
+        By default `first_state`, which alone asks for `speed0`, `pitch0` and `states_covariance`.
 
     Returns
     -------
@@ -341,7 +343,7 @@ def filter_speed(
         return (x, P), (*seen, log_likelihood)
 
     if start is None:
-        start = first_state(f_b[0], w_b[0], speed0, pitch0, gravity, sensors, states_std)
+        start = first_state(f_b[0], w_b[0], speed0, pitch0, gravity, sensors, states_covariance)
     x0 = require_shape("start.states", start.states, (len(names),)).astype(dtype)
     P0 = require_shape("start.covariance", start.covariance, (len(names), len(names))).astype(dtype)
     if counted is not None:

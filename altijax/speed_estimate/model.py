@@ -12,10 +12,38 @@ import jax
 import jax.numpy as jnp
 from jax.typing import ArrayLike
 
+from altijax.calibration.parameters import CONSTANTS, presumed
+
 States = dict[str, jax.Array]
 
 SENSORS = ("2+2", "2+3", "6")
 """Accelerometers + gyros of `filter_speed`: f_x f_y w_y w_z, the same with w_x, or all six."""
+
+_HOLDS_MORE = "assumed 6 deg: the direction of travel holds what the tyres slip sideways and how the body sits, too"
+_TRIMMED = "assumed 0.6 deg/s; what benchmarks.speed_accuracy shows was reached with it"
+SPREADS = {
+    "gyro_bias_x": (0.01, _TRIMMED),
+    "gyro_bias_y": (0.01, _TRIMMED),
+    "gyro_bias_z": (0.01, _TRIMMED),
+    "gyro_scale_z": (0.02, "assumed: most units are better than their tolerance"),
+    "mounting_yaw": (0.1, _HOLDS_MORE),
+    "mounting_pitch": (0.1, _HOLDS_MORE),
+}
+"""Spreads that are not those of `CONSTANTS`, and why."""
+
+OF_CONSTANTS = {
+    **{f"accelerometer_bias_{axis}": (f"accelerometer_bias_{axis}", 1.0) for axis in "xyz"},
+    **{f"gyro_bias_{axis}": (f"gyro_bias_{axis}", 1.0) for axis in "xyz"},
+    "gyro_scale_z": ("gyro_scale_z", -1.0),
+    "travel_yaw": ("mounting_yaw", -1.0),
+    "travel_pitch": ("mounting_pitch", -1.0),
+    "imu_delay": ("gnss_delay", -1.0),
+}
+"""States that are constants of a calibration, their names there, and their sign: the filter sees some from the other
+side. They are zero where readings and aid were corrected. `imu_delay` is that of whatever aids. `lever_x` is none of
+them: the filter begins without a lever whatever was calibrated."""
+
+_SPREAD = {state: presumed([name], SPREADS)[name].spread for state, (name, _) in OF_CONSTANTS.items()}
 
 STATES = {
     "speed": 1.0,
@@ -24,21 +52,21 @@ STATES = {
     "resting_roll": 0.05,
     "lateral_speed": 0.3,
     "vertical_speed": 1.0,
-    "accelerometer_bias_x": 0.3,
-    "accelerometer_bias_y": 0.3,
-    "accelerometer_bias_z": 0.3,
-    "gyro_bias_x": 0.01,
-    "gyro_bias_y": 0.01,
-    "gyro_bias_z": 0.01,
-    "gyro_scale_z": 0.02,
+    "accelerometer_bias_x": _SPREAD["accelerometer_bias_x"],
+    "accelerometer_bias_y": _SPREAD["accelerometer_bias_y"],
+    "accelerometer_bias_z": _SPREAD["accelerometer_bias_z"],
+    "gyro_bias_x": _SPREAD["gyro_bias_x"],
+    "gyro_bias_y": _SPREAD["gyro_bias_y"],
+    "gyro_bias_z": _SPREAD["gyro_bias_z"],
+    "gyro_scale_z": _SPREAD["gyro_scale_z"],
     "rectification_y": 0.05,
-    "travel_yaw": 0.1,
-    "travel_pitch": 0.1,
-    "lever_x": 1.0,
+    "travel_yaw": _SPREAD["travel_yaw"],
+    "travel_pitch": _SPREAD["travel_pitch"],
+    "lever_x": CONSTANTS["lever_arm"].spread,
     "lever_y": 0.3,
     "lever_z": 1.0,
     "suspension_roll": 0.03,
-    "imu_delay": 0.1,
+    "imu_delay": _SPREAD["imu_delay"],
     "side_slip": 0.003,
     "vibration_level": 3.0,
     "vibration_gain": 1.5,

@@ -7,11 +7,12 @@ import pandas as pd
 from scipy.ndimage import uniform_filter1d
 from scipy.spatial.transform import Rotation
 
+from altijax.calibration.priors import prior_of
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import gravity_at, imu_of, start_of
 from altijax.recordings import Recording
 from altijax.series import means_between
-from altijax.speed_estimate.model import STATES
+from altijax.speed_estimate.model import OF_CONSTANTS, SPREADS, STATES
 
 STEP = 0.2
 """Duration of a step in s: long against a car's vibration and rocking, short against its manoeuvres."""
@@ -22,9 +23,6 @@ _VIBRATION_WINDOW = 0.5
 # A car stands where the steps' means spread less than this over two seconds, and less than half of what was ever seen
 # while the aid said that it moved.
 _STILL_WINDOW, _STILL_FORCE, _STILL_RATE, _MOVING_SPEED = 2.0, 0.05, 0.004, 0.5
-
-# Of the states that a calibrated constant is the mean of.
-_MEANS = {"mounting_yaw": "travel_yaw", "mounting_pitch": "travel_pitch"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +42,7 @@ class SpeedDrive:
     t_aid: np.ndarray
     aid: np.ndarray
     gravity: float
-    states_std: np.ndarray
+    states_covariance: np.ndarray
 
 
 def drive_in_steps(recording: Recording, calibration: Calibration | None, until: float) -> SpeedDrive:
@@ -59,7 +57,7 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
         raise ValueError(
             f"recording {recording.name!r} has no gyro, or less than {_SHORTEST} s of it: speed needs both"
         )
-    values = {} if calibration is None else {str(name): float(value) for name, value in calibration.values.items()}
+    values = {} if calibration is None else calibration.known()
     imu = correct_imu(imu, calibration)
     f_b, w_b = (imu[[f"{sensor}{axis}" for axis in "xyz"]].to_numpy(float) for sensor in "ag")
     mounting = Rotation.from_euler("ZY", [values.get("mounting_yaw", 0.0), -values.get("mounting_pitch", 0.0)])
@@ -90,17 +88,18 @@ def drive_in_steps(recording: Recording, calibration: Calibration | None, until:
         t_aid=t_aid - start - values.get(delay, 0.0),
         aid=aid * (values.get("wheel_scale", 1.0) if recording.wheel is not None else 1.0),
         gravity=gravity_at(replace(recording, gnss=None if gnss is None else gnss[: start + until])),
-        states_std=_states_std(calibration, delay),
+        states_covariance=_states_covariance(calibration, delay),
     )
 
 
-def _states_std(calibration: Calibration | None, delay: str) -> np.ndarray:
-    """Standard deviations of the filter's states before the first sample: of what was calibrated, its own."""
-    known = {} if calibration is None else {str(name): float(std) for name, std in calibration.std.items()}
-    named = {_MEANS.get(name, name): std for name, std in known.items()}
-    if delay in known:
-        named["imu_delay"] = known[delay]
-    return np.array([named.get(name, std) for name, std in STATES.items()])
+def _states_covariance(calibration: Calibration | None, delay: str) -> np.ndarray:
+    """Covariance of the filter's states before the first sample, all of them zero but for how the drive begins."""
+    names, signs = zip(*(OF_CONSTANTS | {"imu_delay": (delay, -1.0)}).values(), strict=True)
+    rows = [list(STATES).index(state) for state in OF_CONSTANTS]
+    _, known = prior_of(names, calibration, {name: spread for name, (spread, _) in SPREADS.items()})
+    covariance = np.diag(np.square(list(STATES.values())))
+    covariance[np.ix_(rows, rows)] = known * np.outer(signs, signs)
+    return covariance
 
 
 def aid_of(recording: Recording) -> tuple[np.ndarray, np.ndarray]:

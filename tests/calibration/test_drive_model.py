@@ -89,7 +89,7 @@ def test_ideal_data_leave_no_residual() -> None:
     assert np.abs(residuals[kept]).max() < 5e-3  # m/s; second order in the step
     # and each parameter matters: a tenth of its prior shows
     jacobian = jax.jit(jax.jacfwd(drive_residuals))(jnp.asarray(TRUTH), own, stretch)
-    unit = np.array([row[1] for row in DRIVE_PARAMETERS.values()])
+    unit = np.array([constant.spread for constant in DRIVE_PARAMETERS.values()])
     assert np.all(np.abs(jacobian * unit)[kept].max(0) > 0.015)
 
 

@@ -8,7 +8,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from altijax.calibration.drives import calibrate_drive, calibrate_stretches, drive_stretches
+from altijax.calibration.drive_model import DRIVE_PARAMETERS, GROUPS
+from altijax.calibration.drives import calibrate_driving, calibrate_stretches, drive_stretches
 from altijax.calibration.simulated_drives import Manoeuvres, recorded_drive, town_drive
 from altijax.doppler import DopplerReceiver
 from altijax.instruments import MEMS_ACCELEROMETER, MEMS_GYRO
@@ -21,6 +22,7 @@ TRUTH = planted(
     **{"accelerometer_bias_x": 0.2, "accelerometer_bias_y": -0.15, "accelerometer_bias_z": 0.1},
     **{"gyro_bias_x": 0.004, "gyro_bias_y": -0.006, "gyro_bias_z": 0.005},
 )
+EVERYTHING = list(DRIVE_PARAMETERS)
 DENSITY = {"gyro": float(MEMS_GYRO.noise_density), "accelerometer": float(MEMS_ACCELEROMETER.noise_density)}
 DENSITY["receiver"] = 0.0
 record = jax.jit(
@@ -63,7 +65,7 @@ def test_five_minutes_with_turns() -> None:
 def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
     with pytest.warns(UserWarning, match="magnetometer"):
         recording = read_recording(data_dir / "comma2k19-example")
-    calibration = calibrate_drive(recording)
+    calibration = calibrate_driving([recording], EVERYTHING, method="drive")
     value, std = calibration.table["value"], calibration.table["std"]
     assert value["gnss_delay"] == pytest.approx(0.16, abs=0.04)
     assert value["wheel_delay"] == pytest.approx(-0.03, abs=0.04)
@@ -73,14 +75,14 @@ def test_delays_and_wheel_scale_of_a_real_drive(data_dir: Path) -> None:
     assert std["wheel_scale"] < 1e-3
     # the rear wheels one by one: alike, and as far apart as on cars of that size
     assert abs(value["wheel_difference"]) < 2e-3 and abs(value["track_width"] - 1.55) < 2 * std["track_width"] < 0.2
-    part = calibrate_drive(recording, until=41.0)
-    assert list(part.held_out.columns) == ["nominal", "fitted", "worse"]
-    assert part.held_out.loc["wheel", "fitted"] < part.held_out.loc["wheel", "nominal"]
+    part = calibrate_driving([recording], EVERYTHING, method="drive", until=41.0).held_out.set_index("quantity")
+    assert list(part.index) == list(GROUPS) and part["fitted"].isna().all()
+    assert part.loc["wheel", "held_out"] < part.loc["wheel", "held_out_nominal"]
 
 
 @pytest.mark.slow
 def test_without_wheels_the_others_are_found_and_theirs_are_named(data_dir: Path) -> None:
-    calibration = calibrate_drive(read_recording(data_dir / "rtk-drive"))
+    calibration = calibrate_driving([read_recording(data_dir / "rtk-drive")], EVERYTHING, method="drive")
     table = calibration.table
     wheels = ["wheel_scale", "wheel_delay", "wheel_slip", "wheel_difference", "track_width"]
     np.testing.assert_allclose(table.loc[wheels, "std"], table.loc[wheels, "prior_std"], rtol=1e-6)
@@ -98,7 +100,8 @@ def test_mistakes_are_named(data_dir: Path) -> None:
             {"t": t, "f": zeros, "w": zeros, "t_gnss": t, "v_gnss": zeros, "t_wheel": t, "wheel": t, "apart": t}, 9.8
         )
     with pytest.raises(ValueError, match="lacks a stream"):
-        calibrate_drive(replace(read_recording(data_dir / "umn-thor75"), gnss=None))
+        recording = replace(read_recording(data_dir / "umn-thor75"), gnss=None)
+        calibrate_driving([recording], EVERYTHING, method="drive")
     stretches = drive_stretches(record(drive(Manoeuvres()), jax.random.key(1)), 9.80665)
-    with pytest.raises(ValueError, match="parameters must be different names out of wheel_scale"):
+    with pytest.raises(ValueError, match="must be different names out of wheel_scale"):
         calibrate_stretches(stretches, ["wheel_size"])

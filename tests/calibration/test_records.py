@@ -1,13 +1,21 @@
 """A calibration as a table, as text, and as a file that gives it back to the last digit."""
 
 import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table, worse_where_held_out
+from altijax.calibration.records import (
+    Calibration,
+    constants_table,
+    held_out_row,
+    held_out_table,
+    noise_levels,
+    worse_where_held_out,
+)
 
 NAMES = ["accelerometer_bias_x", "mounting_pitch"]
 ROW = held_out_row('a "drive" \\ é', "elevation", "m", (0.0, 30.0, 90.0), (2.0, 0.1), (5.0, 1 / 3))
@@ -27,12 +35,14 @@ FOUND = Calibration(
 
 
 def same(a: Calibration, b: Calibration) -> bool:
+    pd.testing.assert_series_equal(a.noise, b.noise, check_exact=True, check_index_type=False)
     for field in ("table", "correlation", "absorbed", "held_out"):
         # An index of no columns has no type to speak of.
         of_columns = "equiv" if len(getattr(a, field).columns) else False
         pd.testing.assert_frame_equal(
             getattr(a, field), getattr(b, field), check_exact=True, check_column_type=of_columns
         )
+    np.testing.assert_equal([a.nis, b.converged], [b.nis, a.converged])
     return (a.method, a.undetermined) == (b.method, b.undetermined)
 
 
@@ -42,6 +52,7 @@ def same(a: Calibration, b: Calibration) -> bool:
         {},
         {"absorbed": pd.DataFrame(index=NAMES), "held_out": pd.DataFrame(), "undetermined": ()},
         {"held_out": FOUND.held_out.assign(held_out=np.nan, worse=True)},
+        {"noise": noise_levels({"GNSS horizontal": 1 / 3, "wheel": 0.01}), "nis": 1.02, "converged": False},
     ],
 )
 def test_a_file_gives_it_back(tmp_path: Path, changes: dict[str, object]) -> None:
@@ -59,16 +70,42 @@ def test_what_is_no_calibration_is_named(tmp_path: Path) -> None:
 
 
 def test_the_table_has_values_errors_and_shifts() -> None:
-    assert list(FOUND.table.columns) == ["value", "std", "unit", "prior", "prior_std", "shift"]
+    assert list(FOUND.table.columns) == ["value", "std", "unit", "prior", "prior_std", "shift", "bits"]
     assert FOUND.values["mounting_pitch"] == 1 / 3 and FOUND.std["mounting_pitch"] == np.pi
     np.testing.assert_allclose(FOUND.table["shift"], [1 / 3, 10 / 9])
+    np.testing.assert_allclose(FOUND.table["bits"], np.log2([0.3e17, 0.3 / np.pi]))
     assert FOUND.covariance.loc["accelerometer_bias_x", "mounting_pitch"] == pytest.approx(-0.7e-17 * np.pi)
+
+
+def test_a_file_from_before_noise_was_kept_is_read(tmp_path: Path) -> None:
+    FOUND.save(tmp_path / "car.toml")
+    text = (tmp_path / "car.toml").read_text(encoding="utf-8")
+    (tmp_path / "car.toml").write_text(re.sub(r"nis = .*\nconverged = .*\n\n\[noise\]\n", "", text), encoding="utf-8")
+    assert same(Calibration.load(tmp_path / "car.toml"), FOUND)
+
+
+def test_what_is_determined_is_known_from_the_covariance_alone() -> None:
+    """Two constants of which the data tell the sum well and the difference not at all."""
+    units, information = np.array([0.3, 0.05]), 1e8 * np.array([[1.0, 1.0], [1.0, 1.0]])
+    covariance = np.linalg.inv(information / np.outer(units, units) + np.diag(units**-2.0))
+    std = np.sqrt(np.diag(covariance))
+    rows = {"value": 0.0, "std": std, "unit": "1", "prior": 0.0, "prior_std": units}
+    found = dataclasses.replace(
+        FOUND,
+        table=constants_table(pd.DataFrame(rows, index=NAMES)),
+        correlation=pd.DataFrame(covariance / np.outer(std, std), NAMES, NAMES),
+    ).identification
+    assert found.names == tuple(NAMES) and found.rank == 1
+    np.testing.assert_allclose(found.information, [2e8, 0], rtol=1e-6, atol=1e-6)
+    np.testing.assert_allclose(found.std, std, rtol=1e-6)
 
 
 def test_it_reads_as_a_table_and_says_when_it_harms() -> None:
     for text in (repr(FOUND), FOUND._repr_html_()):
         for word in ("slope", "mounting_pitch", "m/s^2", "until", "sentence"):
             assert word in text
+    heard = dataclasses.replace(FOUND, noise=noise_levels({"wheel": 0.0123}), nis=1.02)
+    assert "wheel 0.0123; normalised innovation squared 1.02" in repr(heard) and "wheel" in heard._repr_html_()
     assert worse_where_held_out(FOUND) == ""
     row = held_out_row("drive", "speed", "m/s", (0.0, 30.0, 90.0), (2.0, 0.1), (0.5, 0.7))
     harmful = dataclasses.replace(FOUND, held_out=held_out_table([row]))

@@ -140,7 +140,7 @@ def test_what_harms_later_is_said() -> None:
     [
         (
             lambda: estimates.calibrate(EXACT, "accelerometer_bias", method="slope"),
-            "names out of accelerometer_bias_x, .* got accelerometer_bias",
+            "names out of wheel_scale, .* got accelerometer_bias",
         ),
         (lambda: estimates.calibrate(EXACT, [], method="slope"), "got none"),
         (lambda: estimates.calibrate([], "wheel_scale", method="slope"), "one recording or more, got none"),

@@ -46,10 +46,12 @@ def test_a_calibrated_constant_is_off_by_itself_and_by_what_it_absorbed(drive: D
     assert prior.covariance[bias, pitch] == pytest.approx(absorbed * UNCERTAINTY["mounting_pitch"])
 
 
-def test_another_method_takes_value_and_error_alone(drive: Drive) -> None:
-    prior = prior_constants(drive, "fused", BIAS)
+def test_another_method_takes_the_same_of_it(drive: Drive) -> None:
+    prior, own = (prior_constants(drive, method, BIAS) for method in ("fused", "slope"))
     assert prior.names[0] == "accelerometer_bias_x" and prior.mean[0] == 0.2
-    assert prior.covariance[0, 0] == pytest.approx(0.01**2)
+    assert prior.covariance[0, 0] == own.covariance[0, 0]
+    # The way without a mounting does not know what it absorbed.
+    assert prior_constants(drive, "shirai", BIAS).covariance[0, 0] == pytest.approx(0.01**2)
 
 
 def test_what_is_fixed_is_no_unknown(drive: Drive) -> None:

@@ -20,14 +20,13 @@ def drive() -> Recording:
 
 def calibration(**values: float) -> Calibration:
     columns = {"value": pd.Series(values), "std": 0.0, "unit": "1", "prior": 0.0, "prior_std": 1.0}
-    empty = pd.DataFrame()
     return Calibration(
         method="slope",
         table=constants_table(pd.DataFrame(columns)),
-        correlation=empty,
-        absorbed=empty,
+        correlation=pd.DataFrame(np.eye(len(values)), list(values), list(values)),
+        absorbed=pd.DataFrame(),
         undetermined=(),
-        held_out=empty,
+        held_out=pd.DataFrame(),
     )
 
 
@@ -76,9 +75,14 @@ def test_a_calibration_is_used_as_far_as_a_speed_depends_on_it(drive: Recording)
 def test_what_was_calibrated_begins_with_its_own_error(drive: Recording) -> None:
     known = calibration(gyro_bias_y=0.003, mounting_yaw=0.1, wheel_delay=0.2, gnss_delay=0.1)
     known.table["std"] = [0.001, 0.002, 0.003, 0.004]
-    std = dict(zip(STATES, drive_in_steps(drive, known, 20.0).states_std, strict=True))
-    changed = {"gyro_bias_y": 0.001, "travel_yaw": 0.002, "imu_delay": 0.003}
-    assert std == STATES | changed
+    known.correlation.loc["gyro_bias_y", "mounting_yaw"] = known.correlation.loc["mounting_yaw", "gyro_bias_y"] = 0.5
+    covariance = drive_in_steps(drive, known, 20.0).states_covariance
+    std = STATES | {"gyro_bias_y": 0.001, "travel_yaw": 0.002, "imu_delay": 0.003}
+    expected = np.diag(np.square(list(std.values())))
+    # The filter sees the mounting from the other side.
+    bias, yaw = (list(STATES).index(name) for name in ("gyro_bias_y", "travel_yaw"))
+    expected[bias, yaw] = expected[yaw, bias] = -0.5 * 0.001 * 0.002
+    np.testing.assert_allclose(covariance, expected, atol=1e-15)
 
 
 def test_a_late_aid_does_not_serve_beyond_its_end(drive: Recording) -> None:
