@@ -240,6 +240,7 @@ from .strapdown import (
     integrate_position as integrate_position,
     integrate_velocity as integrate_velocity,
 )
+from .vehicle.estimates import estimate_drive as estimate_drive
 from .wahba import (
     SharedAttitude as SharedAttitude,
     fit_shared_attitude as fit_shared_attitude,

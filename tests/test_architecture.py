@@ -21,7 +21,7 @@ LEVELS = [
     ["_epoch_fit.cost"],
     ["_epoch_fit.steps"],
     ["earth", "roads", "smoothing", "delays", "rotation_splines"],
-    ["motion_estimate.preintegration", "motion_estimate.state_smoother"],
+    ["motion_estimate.preintegration", "inference.state_smoother"],
     ["motion_estimate.model"],
     ["motion_estimate.intervals"],
     ["motion_estimate.smoother"],
@@ -34,18 +34,26 @@ LEVELS = [
     ["speed_estimate.model"],
     ["speed_estimate.filter"],
     ["metrics"],
-    ["padding", "series", "programs"],
+    ["padding", "series", "programs", "inference.layout", "inference.levels"],
     ["stages", "formats.stream_checks", "motion_estimate.start"],
     ["formats.tidy_folder", "formats.logs", "calibration.records"],
     ["formats.ublox", "calibration.priors"],
     ["recordings", "calibration.reference_fit"],
     ["datasets", "drives"],
     ["motion_estimate.readings", "elevation_estimate.model", "elevation_estimate.smoother", "calibration.drives"],
+    ["vehicle.parts", "vehicle.mounting"],
+    ["vehicle.inertial", "vehicle.measurements.course", "vehicle.measurements.standstill"],
+    ["vehicle.measurements.doppler_velocity"],
+    ["vehicle.measurements.gnss_position", "vehicle.measurements.known_height", "vehicle.measurements.wheel_speed"],
+    ["vehicle.readings", "vehicle.sensors"],
+    ["vehicle.smoother", "vehicle.start"],
+    ["vehicle.beliefs", "vehicle.search", "vehicle.at_samples"],
+    ["vehicle.estimates"],
     ["elevation_estimate.posterior"],
     ["elevation_estimate.priors"],
     ["elevation_estimate.estimates", "motion_estimate.estimates", "speed_estimate.steps"],
     ["elevation_estimate.calibration", "motion_estimate.scores", "speed_estimate.estimates"],
-    ["samples.make_hill_road", "samples.hilly_drives"],
+    ["samples.make_hill_road", "samples.hilly_drives", "samples.foreign_drives"],
     ["speed_estimate.outages", "speed_estimate.calibration", "motion_estimate.calibration"],
     ["estimates"],
     ["plots"],
@@ -54,7 +62,7 @@ LEVEL = {name: number for number, names in enumerate(LEVELS) for name in names}
 CORE = {name for name in LEVEL if LEVEL[name] <= LEVEL["metrics"]}
 MODULES = sorted(
     ".".join(path.relative_to(PACKAGE).with_suffix("").parts)
-    for folder in (PACKAGE, *(path.parent for path in PACKAGE.glob("*/__init__.py")))
+    for folder in (path.parent for path in PACKAGE.rglob("__init__.py"))
     for path in folder.glob("*.py")
     if path.stem != "__init__"
 )

@@ -10,6 +10,7 @@ from altijax.datasets import load_dataset
 from altijax.estimates import ACCEPTED, calibrate, estimate_elevation, estimate_motion, estimate_speed
 from altijax.programs import count_programs
 from altijax.recordings import Recording
+from altijax.vehicle.estimates import estimate_drive
 
 Work = Callable[[Recording], object]
 
@@ -28,6 +29,7 @@ VERBS: dict[str, Work] = {
     **{f"motion {m}": lambda r, m=m: estimate_motion(r, method=m) for m in ("epoch", "window")},
 }
 SLOW_VERBS: dict[str, Work] = {
+    "drive": estimate_drive,
     "motion batch": lambda r: estimate_motion(r, method="batch"),
     "motion batch, no gyro": lambda r: estimate_motion(r, method="batch", use_gyro=False),
 }

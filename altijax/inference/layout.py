@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -43,8 +44,8 @@ class Layout:
         begin = sum(size for _, size in self.parts[: self.names.index(name)])
         return slice(begin, begin + self.sizes[name])
 
-    def split(self, x: jax.Array) -> dict[str, jax.Array]:
-        """The parts of states (..., states) by name, those of one entry without an axis of their own."""
+    def split(self, x: Any) -> dict[str, Any]:
+        """The parts of states (..., states), of JAX or NumPy, by name; one entry has no axis of its own."""
         return {name: x[..., self.at(name).start] if size == 1 else x[..., self.at(name)] for name, size in self.parts}
 
     def joined(self, parts: Mapping[str, ArrayLike], shape: tuple[int, ...], dtype: jnp.dtype) -> jax.Array:
@@ -57,7 +58,9 @@ class Layout:
         ]
         return jnp.concatenate(whole, -1)
 
-    def matrix(self, blocks: Mapping[tuple[str, str], jax.Array], shape: tuple[int, ...], dtype: jnp.dtype) -> jax.Array:
+    def matrix(
+        self, blocks: Mapping[tuple[str, str], jax.Array], shape: tuple[int, ...], dtype: jnp.dtype
+    ) -> jax.Array:
         """Matrices (*shape, states, states) of their blocks; what is not named is zero."""
         rows = []
         for row, height in self.parts:

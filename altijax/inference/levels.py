@@ -1,4 +1,4 @@
-"""Most probable noise levels: their logarithms by the gradient of a likelihood, under a normal prior about usual ones."""
+"""Most probable noise levels, by the gradient of a likelihood, under a normal prior of their logarithms."""
 
 from collections.abc import Callable, Mapping
 

@@ -12,6 +12,7 @@ import jax
 import jax.numpy as jnp
 
 from altijax import _safe
+from altijax.inference.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
 from altijax.motion_estimate.model import (
     STATES,
@@ -25,7 +26,6 @@ from altijax.motion_estimate.model import (
     moved,
     preintegrated_intervals,
 )
-from altijax.inference.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 
 # A velocity more than so many standard deviations from what all others say is trusted that much less.
 _GATE = 4.0

@@ -1,6 +1,7 @@
 """The motion at every IMU sample from that at the instants: led there by the readings, with its errors."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -70,7 +71,7 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
     kept = np.append(True, np.diff(np.maximum.accumulate(knots)) > 1e-9)
     knots = knots[kept]
 
-    def along(first: np.ndarray, later: np.ndarray) -> np.ndarray:
+    def along(first: Any, later: Any) -> np.ndarray:
         return np.concatenate([first[:1], later.reshape(-1, *first.shape[1:])])[kept]
 
     inside = np.clip(t, knots[0], knots[-1])
@@ -94,16 +95,14 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
         J[:, 3:6, 10:], J[:, 6:9, 10:] = _skew(rate) @ C_nb, C_nb - C_nb[:1]
         P = J @ P @ np.swapaxes(J, -1, -2)
         v_n, p_n = v_n + around, p_n + arm - arm[:1]
-    # A reading is of its stamp, or the mean since the one before: by half a sample all may be late.
-    late = np.median(np.diff(t)) / 2
+    # A reading is of its stamp, or the mean since the one before, behind a filter: all may be late by about a sample.
+    late = np.median(np.diff(t))
     shift = late * np.concatenate([rate, np.gradient(v_n, t, axis=0), np.zeros((t.size, 4))], -1)
     P += shift[:, :, None] * shift[:, None, :]
     return Samples(t=t, C_nb=C_nb, v_n=v_n, p_n=p_n, way=way, covariance=P)
 
 
-def _covariance(
-    t: np.ndarray, layout: Layout, fit: Fit, between: Between, levels: dict[str, float]
-) -> np.ndarray:
+def _covariance(t: np.ndarray, layout: Layout, fit: Fit, between: Between, levels: dict[str, float]) -> np.ndarray:
     named = (*MOVING, "antenna") if "antenna" in layout else MOVING
     moving = np.concatenate([np.arange(layout.size)[layout.at(name)] for name in named])
     distinct = np.append(True, np.diff(between.instants) > 1e-9)

@@ -1,6 +1,7 @@
 """What is believed of a vehicle's states before its record: of any vehicle's, or as a calibration has found them."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -39,12 +40,12 @@ def belief_of(use: Use, calibration: Calibration | None = None) -> Belief:
         Mean and covariance.
     """
     parts, layout = parts_of(use), layout_of(use)
-    mean = _spread(parts, "mean")
+    mean: Any = _spread(parts, "mean")
     std = _spread(parts, "std")
     if not {"velocity", "position"} & set(use):
         # Nothing tells where East is: it is where the drive starts to.
         std[layout.at("attitude").start + 2] = _EAST
-    covariance = np.diag(np.square(std))
+    covariance: Any = np.diag(np.square(std))
     if calibration is None:
         return Belief(mean=mean, covariance=covariance)
     found = {

@@ -18,7 +18,7 @@ from altijax.vehicle.at_samples import Samples, as_table, at_samples
 from altijax.vehicle.beliefs import belief_of
 from altijax.vehicle.inertial import MOVING
 from altijax.vehicle.measurements import standstill
-from altijax.vehicle.measurements.doppler_velocity import GNSS_DELAY, velocities
+from altijax.vehicle.measurements.doppler_velocity import USUAL_DELAY, velocities
 from altijax.vehicle.measurements.gnss_position import origin_of
 from altijax.vehicle.mounting import mounting_of
 from altijax.vehicle.search import Search, best_start, likely, said_between
@@ -29,8 +29,11 @@ SOURCES = ("gyro", "wheel", "velocity", "position", "course", "standstill")
 """What `estimate_drive` can use beside the accelerometer: the gyro; speeds of wheels; velocities of GNSS and, by wish,
 its places; that a vehicle goes where it points; that it stands where the IMU is still."""
 
+CONSISTENT = "consistent: measurements miss the estimate by as much as their errors allow"
+"""The verdict of an estimate whose error bars are to be trusted."""
+
 # Means of squared surprises beyond which the errors that are stated are not to be believed.
-_CONSISTENT = 2.0
+_MOST_SURPRISING = 2.0
 # Delays of receivers to start from without a gyro, s, and how far from the usual one that which windows of epochs find
 # may be before that one is tried as well.
 _DELAYS = (0.05, 0.35, 0.65)
@@ -99,8 +102,8 @@ def estimate_drive(
     samples = replace(samples, C_nb=samples.C_nb @ mounting.as_matrix())
     estimate = as_table(recording, samples).assign(**_elevation(search, samples), **_places(recording, search, samples))
     estimate["valid"] = _supported(recording, sources)
-    estimate.attrs = summary(search, start)
-    if not estimate.attrs["verdict"].startswith("consistent"):
+    estimate.attrs.update(summary(search, start))
+    if estimate.attrs["verdict"] != CONSISTENT:
         warnings.warn(f"recording {recording.name!r}: {estimate.attrs['verdict']}", stacklevel=2)
     return estimate
 
@@ -155,6 +158,8 @@ def smoothed(
     """The most probable motion and noise levels of a recording, its axes the vehicle's."""
     use = (*sources, *(("height",) if heights else ()))
     belief = belief_of(use, calibration)
+    if heights:
+        belief.mean[layout_of(use).at("datum")] = heights[0][1]
     if calibration is not None and "gnss_delay" in calibration.values:
         delays: tuple[float, ...] = (float(calibration.values["gnss_delay"]),)
     elif "velocity" not in use:
@@ -162,7 +167,7 @@ def smoothed(
     elif "gyro" in use:
         stage("delay of the GNSS velocities")
         found = receiver_delay(recording)
-        delays = (found, GNSS_DELAY.mean) if abs(found - GNSS_DELAY.mean) > _DOUBTFUL else (found,)
+        delays = (found, USUAL_DELAY) if abs(found - USUAL_DELAY) > _DOUBTFUL else (found,)
     else:
         delays = _DELAYS
     stage("first trajectory")
@@ -205,7 +210,11 @@ def _elevation(search: Search, samples: Samples) -> dict[str, np.ndarray]:
     both = [layout.at("position").start + 2, layout.at("datum").start]
     said = said_between(search)
     variance = np.asarray(search.fit.covariance)[:, both][:, :, both].sum((1, 2))
-    return {"elevation": up + datum, "elevation_std": np.sqrt(np.maximum(np.interp(samples.t, said.instants, variance), 0))}
+    at_all = np.interp(samples.t, said.instants, variance)
+    return {
+        "elevation": up + datum,
+        "elevation_std": np.sqrt(np.maximum(at_all, 0)),
+    }
 
 
 def _places(recording: Recording, search: Search, samples: Samples) -> dict[str, np.ndarray]:
@@ -243,9 +252,7 @@ def _supported(recording: Recording, sources: Use) -> np.ndarray:
         before = t - stamps[np.clip(k - 1, 0, stamps.size - 1)]
         after = stamps[np.clip(k, 0, stamps.size - 1)] - t
         beyond = (k == 0) | (k == stamps.size)
-        near |= np.where(
-            beyond, np.maximum(before, after) <= 2 * usual, before + after <= max(5 * usual, 2.0)
-        )
+        near |= np.where(beyond, np.maximum(before, after) <= 2 * usual, before + after <= max(5 * usual, 2.0))
     usual = usual_step(t - t[0])
     return near & ~(np.diff(t, prepend=t[0]) > max(5 * usual, 0.1))
 
@@ -283,10 +290,10 @@ def summary(search: Search, start: float) -> dict[str, object]:
 
 
 def _verdict(nis: dict[str, float]) -> str:
-    off = [f"{name} {value:.1f}" for name, value in nis.items() if value > _CONSISTENT]
+    off = [f"{name} {value:.1f}" for name, value in nis.items() if value > _MOST_SURPRISING]
     if not off:
-        return "consistent: measurements miss the estimate by as much as their errors allow"
+        return CONSISTENT
     return (
-        f"not to be trusted: measurements miss the estimate by more than their errors allow (mean square {', '.join(off)} "
-        "instead of 1); error bars are too small, look at `rejected`"
+        "not to be trusted: measurements miss the estimate by more than their errors allow (mean square "
+        f"{', '.join(off)} instead of 1); error bars are too small, look at attrs['rejected']"
     )

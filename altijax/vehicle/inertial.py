@@ -92,6 +92,8 @@ class Between:
         Velocity and position there.
     way : (intervals, steps) m
         Way there.
+    led : (intervals,) m
+        Way that the readings alone lead to at the end.
     gained : (intervals, 9)
         Missed turn as a rotation vector in navigation axes, integral of the specific force, and its integral.
     by : dict of str to (intervals, 3, size)
@@ -112,6 +114,7 @@ class Between:
     v_n: jax.Array
     p_n: jax.Array
     way: jax.Array
+    led: jax.Array
     gained: jax.Array
     by: dict[str, jax.Array]
     turn_by: dict[str, jax.Array]
@@ -138,11 +141,20 @@ def gyro_matrix(x: Mapping[str, jax.Array]) -> jax.Array:
 
 
 def _matrix(x: Mapping[str, jax.Array], *parts: tuple[str, np.ndarray]) -> jax.Array:
-    return sum(jnp.einsum("...p,pij->...ij", x[name], places) for name, places in parts)
+    return jnp.einsum(
+        "...p,pij->...ij",
+        jnp.concatenate([x[name] for name, _ in parts], -1),
+        np.concatenate([places for _, places in parts]),
+    )
 
 
 def between_instants(
-    trajectory: Trajectory, intervals: Intervals, instants: jax.Array, share: jax.Array, gravity: jax.Array, layout: Layout
+    trajectory: Trajectory,
+    intervals: Intervals,
+    instants: jax.Array,
+    share: jax.Array,
+    gravity: jax.Array,
+    layout: Layout,
 ) -> Between:
     """What the readings say between the instants of a trajectory.
 
@@ -190,11 +202,13 @@ def between_instants(
     moved = jnp.cumsum(0.5 * (gained + before) * intervals.dt[..., None], 1)
     v_n = v[:-1, None] + gained + later[..., None] * down
     p_n = p[:-1, None] + later[..., None] * v[:-1, None] + moved + 0.5 * later[..., None] ** 2 * down
+    speed = _safe.norm(jnp.concatenate([v[:-1, None], v_n], 1))
+    way = x["way"][:-1, None] + jnp.cumsum(0.5 * (speed[:, 1:] + speed[:, :-1]) * intervals.dt, 1)
+    led = way[:, -1]
+    way = way + share[1:] * (x["way"][1:] - led)[:, None]
     part = share[1:, None]
     v_n = v_n + part * (v[1:] - v_n[:, -1])[:, None]
     p_n = p_n + part * (p[1:] - p_n[:, -1])[:, None]
-    speed = _safe.norm(jnp.concatenate([v[:-1, None], v_n], 1))
-    way = x["way"][:-1, None] + jnp.cumsum(0.5 * (speed[:, 1:] + speed[:, :-1]) * intervals.dt, 1)
 
     # Gains multiply the reading, before the bias is taken off.
     by_matrix = summed.velocity_by_matrix - jnp.einsum("kai,kj->kaij", summed.velocity_by_bias, added)
@@ -209,7 +223,9 @@ def between_instants(
     turn_by = {"gyro_bias": C @ summed.turn_by_gyro[..., :3]}
     if "gyro_scale" in layout:
         for found, columns in ((by, summed.velocity_by_gyro), (turn_by, summed.turn_by_gyro)):
-            raw = columns[..., 3:].reshape(-1, 3, 3, 3) - jnp.einsum("kai,kj->kaij", columns[..., :3], x["gyro_bias"][:-1])
+            raw = columns[..., 3:].reshape(-1, 3, 3, 3) - jnp.einsum(
+                "kai,kj->kaij", columns[..., :3], x["gyro_bias"][:-1]
+            )
             found["gyro_scale"] = C @ jnp.einsum("kaij,pij->kap", raw, _SCALES)
             found["gyro_axes"] = C @ jnp.einsum("kaij,pij->kap", raw, _ACROSS)
     return Between(
@@ -221,14 +237,12 @@ def between_instants(
         v_n=v_n,
         p_n=p_n,
         way=way,
+        led=led,
         gained=jnp.concatenate([jnp.einsum("kij,kj->ki", C, turn), gained[:, -1], moved[:, -1]], -1),
         by=by,
         turn_by=turn_by,
         rate=_about_instants(intervals.w_b, intervals, share),
-        acceleration=_about_instants(
-            jnp.einsum("ktij,ktj->kti", C[:, None] @ summed.C, f_b), intervals, share
-        )
-        + down,
+        acceleration=_about_instants(jnp.einsum("ktij,ktj->kti", C[:, None] @ summed.C, f_b), intervals, share) + down,
     )
 
 
@@ -241,14 +255,16 @@ def _about_instants(series: jax.Array, intervals: Intervals, share: jax.Array) -
     middle = 0.5 * (share[1:] + share[:-1]) * intervals.duration[:, None]
     there = (jnp.diff(share) > 0) & (intervals.duration > 0)[:, None]
 
-    def mean(weight: jax.Array) -> jax.Array:
+    def mean(weight: jax.Array) -> tuple[jax.Array, jax.Array]:
         total = jnp.sum(weight, 1)
         return jnp.einsum("kt,kti->ki", weight / jnp.where(total > 0, total, 1)[:, None], series), total > 0
 
     first = jnp.arange(share.size - 1) == 0
     last = share[1:] >= 1
     after, has_after = mean(1.0 * there * ((middle < _ABOUT) | first))
-    before, has_before = mean(1.0 * there * ((intervals.duration[:, None] - middle < _ABOUT) | (last & (share[:-1] < 1))))
+    before, has_before = mean(
+        1.0 * there * ((intervals.duration[:, None] - middle < _ABOUT) | (last & (share[:-1] < 1)))
+    )
     after = jnp.concatenate([after, before[-1:]])
     before = jnp.concatenate([after[:1], before])
     has_after = jnp.append(has_after, False)[:, None]
@@ -329,7 +345,8 @@ def transitions(
     missing["velocity"] = v[before] + down * dt[:, None] + gained - v[after] - turned_by
     missing["position"] = p[before] - p[after] + dt[:, None] * v[before] + moved + 0.5 * dt[:, None] ** 2 * down
     missing["position"] = missing["position"] - dt[:, None] / 3 * turned_by
-    missing["way"] = between.way[:, -1] - x["way"][after]
+    third_of_turn = jnp.einsum("kij,kj->ki", along, dt[:, None] / 3 * turned_by)[:, 0]
+    missing["way"] = between.led - third_of_turn - x["way"][after]
     c = layout.joined(missing, shape, dtype)
 
     turned = (levels["rotation"] ** 2 * dt + (_UNSEEN_TURN * gap) ** 2)[:, None, None]
@@ -349,7 +366,11 @@ def transitions(
         ),
     ):
         moving = moving + response @ size @ jnp.swapaxes(response, -1, -2)
-    alone = {name: jnp.repeat((levels[part.walk] ** 2 * dt)[:, None], part.size, -1) for name, part in parts.items() if part.walk}
+    alone = {
+        name: jnp.repeat((levels[part.walk] ** 2 * dt)[:, None], part.size, -1)
+        for name, part in parts.items()
+        if part.walk
+    }
     for name, keep in kept.items():
         alone[name] = stationary(parts[name], levels) * (1 - keep * keep)[:, None]
     diagonal = layout.joined(alone, shape, dtype)
@@ -368,5 +389,5 @@ def moved(trajectory: Trajectory, x: jax.Array, layout: Layout) -> Trajectory:
     attitude = layout.at("attitude")
     return Trajectory(
         C_nb=rotvec_to_matrix(x[:, attitude]) @ trajectory.C_nb,
-        x=trajectory.x + x.at[:, attitude].set(0),
+        x=trajectory.x + jnp.asarray(x).at[:, attitude].set(0),
     )

@@ -46,7 +46,9 @@ def mounting_of(recording: Recording, speed: pd.Series) -> Rotation:
         return Rotation.identity()
     rate = imu[["gx", "gy", "gz"]].to_numpy(float) if "gx" in imu else np.zeros_like(force)
     t, force, turning = t[inside], level.apply(force[inside]), level.apply(rate[inside])[:, 2]
-    smooth = low_pass(t - t[0], np.vstack([np.interp(t, t_speed, speed.to_numpy(float)), force.T[:2], turning]), _CUTOFF)
+    smooth = low_pass(
+        t - t[0], np.vstack([np.interp(t, t_speed, speed.to_numpy(float)), force.T[:2], turning]), _CUTOFF
+    )
     # As complex numbers, forward and to the left: forces are the accelerations, turned by the yaw of the mounting.
     expected = np.gradient(smooth[0], t) + 1j * smooth[0] * smooth[3]
     read = smooth[1] + 1j * smooth[2]

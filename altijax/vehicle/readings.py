@@ -1,10 +1,7 @@
-"""From a recording to the arrays of the vehicle's smoother: summed IMU readings, instants, and what is measured there."""
+"""From a recording to the arrays of the vehicle's smoother: summed IMU readings, and the instants of its states."""
 
 from typing import Any
-from dataclasses import dataclass
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 
 from altijax.drives import gravity_at, imu_of, start_of, usual_step, without_bursts
@@ -12,15 +9,9 @@ from altijax.motion_estimate.intervals import MotionReadings
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 from altijax.vehicle.measurements.doppler_velocity import velocities
-from altijax.vehicle.parts import Rows
 
 _SAMPLES, _INSTANTS, _STEPS, _EVEN = 16384, 64, 16, 8
 _BEYOND = 1.0
-
-
-def usual_epochs(recording: Recording) -> float:
-    found = velocities(recording)
-    return np.inf if found is None else float(np.median(np.diff(found[0])))
 
 
 def readings_of(
@@ -59,6 +50,13 @@ def readings_of(
         gravity=np.float64(gravity_at(recording)),
     )
     return MotionReadings(**arrays)
+
+
+def instants_of(readings: MotionReadings, delay: float) -> np.ndarray:
+    """The instants (time,), s, on the IMU's clock, within its span, at a delay of the receiver (s)."""
+    t_imu = np.asarray(readings.t)
+    t = np.clip(readings.instant - delay * np.asarray(readings.delayed), t_imu[0], t_imu[-1])
+    return np.maximum.accumulate(t)
 
 
 def _epochs(recording: Recording, end: float, delay: float, shortest: float) -> np.ndarray:

@@ -2,21 +2,21 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import partial
 
 import jax
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from altijax.inference.levels import likely_levels
-from altijax.motion_estimate.intervals import MotionReadings, instants_at
+from altijax.motion_estimate.intervals import MotionReadings
 from altijax.motion_estimate.start import quick_jit
 from altijax.recordings import Recording
 from altijax.stages import Stages
 from altijax.vehicle.inertial import Between, Trajectory
 from altijax.vehicle.measurements import known_height
 from altijax.vehicle.parts import Rows
-from altijax.vehicle.readings import readings_of
+from altijax.vehicle.readings import instants_of, readings_of
 from altijax.vehicle.sensors import Use, kinds_of, layout_of, levels_of
 from altijax.vehicle.smoother import Belief, Fit, between, vehicle_pass
 from altijax.vehicle.start import first_trajectory
@@ -31,6 +31,9 @@ _LONGEST, _LONGEST_EVEN = 1.0, 0.5
 _SHORTEST, _SHORTEST_FREE = 0.4, 0.1
 # Factor on the variances of wheels and the course while a first attitude may be off by a right angle.
 _EASED = 1e8
+_ROUNDS_OF_DOUBT = 3
+# How far, as a logarithm, a round may move noise levels: the likelihood is that about the trajectory of the last ones.
+_REACH = 2.0
 # A start must be better than the one before by this much of a log-likelihood.
 _BETTER = 1.0
 
@@ -80,7 +83,7 @@ def rows_at(
 ) -> dict[str, Rows]:
     """Measurements by kind at the instants; nothing at those that only fill up."""
     stamped = np.asarray(readings.instant)
-    on_imu = np.asarray(jax.device_get(instants_at(readings, np.float64(delay))))
+    on_imu = instants_of(readings, delay)
     receiver = stamped + delay * (1 - np.asarray(readings.delayed))
     distinct = np.append(True, np.diff(on_imu) > 1e-9)
     size, found = stamped.size, {}
@@ -99,9 +102,7 @@ def rows_at(
     return found
 
 
-def begun(
-    recording: Recording, use: Use, delay: float, belief: Belief, heights: list[tuple[float, float]]
-) -> Search:
+def begun(recording: Recording, use: Use, delay: float, belief: Belief, heights: list[tuple[float, float]]) -> Search:
     """A search at its start, at a delay."""
     gyro = "gyro" in use
     longest = _LONGEST_EVEN if not gyro or "wheel" in use else _LONGEST
@@ -226,23 +227,23 @@ def objective_of(search: Search) -> float:
 def likely(search: Search, stage: Stages, rounds: int = 6) -> Search:
     """Noise levels and trajectory in turns, until the levels stay."""
     known = levels_of(search.use)
+    usual = {name: level.usual for name, level in known.items()}
+    spread = {name: level.spread for name, level in known.items()}
+    # What all others contradict must not make the levels so large that it no longer stands out.
+    for _ in range(_ROUNDS_OF_DOUBT):
+        search = passed(search, 4, robust=True)
     for turn in range(rounds):
         stage(f"noise levels, round {turn + 1}")
-        said = _between(search.use, search.readings, search.trajectory, np.float64(search.delay))
-
-        def log_likelihood(levels: dict[str, float]) -> tuple[float, Mapping[str, Any]]:
-            fit = _one(search, search.trajectory, search.delay, said, levels)
-            return float(fit.log_likelihood), jax.device_get(fit.by_level)
-
-        levels, objective = likely_levels(
-            log_likelihood,
-            search.levels,
-            {name: level.usual for name, level in known.items()},
-            {name: level.spread for name, level in known.items()},
-            reach=2.0,
-        )
-        settled = turn > 1 and abs(objective - search.objective) < 1.0
+        likelihood = partial(_likelihood, search, said_between(search))
+        levels, objective = likely_levels(likelihood, search.levels, usual, spread, _REACH)
+        settled = turn > 1 and abs(objective - search.objective) < _BETTER
         search = passed(replace(search, levels=levels, objective=objective), 8, robust=True)
         if settled:
             break
     return passed(search, 8)
+
+
+def _likelihood(search: Search, said: Between, levels: Mapping[str, float]) -> tuple[float, Mapping[str, float]]:
+    """Logarithm of the likelihood of levels about the trajectory of a search, and its derivative by each."""
+    fit = jax.device_get(_one(search, search.trajectory, search.delay, said, levels))
+    return float(fit.log_likelihood), {name: float(slope) for name, slope in fit.by_level.items()}

@@ -1,6 +1,6 @@
-"""A set of sensors as a set of names: the parts of the state, the noise levels and the measurements that they make up."""
+"""A set of sensors as a set of names: the parts of the state, noise levels and measurements that it makes up."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 from altijax.inference.layout import Layout
 from altijax.vehicle import inertial
@@ -18,6 +18,7 @@ KINDS: Mapping[str, Kind] = {
 """Kinds of measurements by name."""
 
 LEVERS = ("antenna", "axle")
+"""Parts that only a gyro tells of."""
 
 Use = tuple[str, ...]
 """Names of `KINDS` in use, "gyro", and "wind" for a craft in moving air."""
@@ -30,9 +31,9 @@ def kinds_of(use: Use) -> dict[str, Kind]:
 
 def parts_of(use: Use) -> dict[str, Part]:
     """The parts of the state of a set, in their order."""
-    parts = inertial.PARTS | (inertial.GYRO_PARTS if "gyro" in use else inertial.TURNING_PARTS)
+    parts: dict[str, Part] = inertial.PARTS | (inertial.GYRO_PARTS if "gyro" in use else inertial.TURNING_PARTS)
     for kind in kinds_of(use).values():
-        parts = parts | kind.parts
+        parts = parts | dict(kind.parts)
     if "gyro" not in use:
         # What turns too fast to be known tells nothing of where sensors are.
         parts = {name: part for name, part in parts.items() if name not in LEVERS}
@@ -41,9 +42,9 @@ def parts_of(use: Use) -> dict[str, Part]:
 
 def levels_of(use: Use) -> dict[str, Level]:
     """The noise levels of a set."""
-    levels = inertial.LEVELS | ({} if "gyro" in use else inertial.TURNING_LEVELS)
+    levels: dict[str, Level] = inertial.LEVELS | ({} if "gyro" in use else inertial.TURNING_LEVELS)
     for kind in kinds_of(use).values():
-        levels = levels | kind.levels
+        levels = levels | dict(kind.levels)
     return levels
 
 

@@ -173,11 +173,10 @@ def _measurements(
     at = Instant(
         rate=between.rate, acceleration=between.acceleration, delay=jnp.broadcast_to(delay, between.instants.shape)
     )
-    stamped = readings.instant + delay * (1 - jnp.asarray(readings.delayed))
+    stamped = jnp.asarray(readings.instant) + delay * (1 - jnp.asarray(readings.delayed))
+    stamps = {name: jnp.asarray(row.stamp) for name, row in rows.items()}
     return {
-        name: _of_kind(
-            kind, layout, trajectory, at, rows[name].stamp - (stamped if kind.by_receiver else between.instants)
-        )
+        name: _of_kind(kind, layout, trajectory, at, stamps[name] - (stamped if kind.by_receiver else between.instants))
         for name, kind in kinds_of(use).items()
     }
 

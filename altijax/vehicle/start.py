@@ -1,18 +1,19 @@
 """A trajectory to begin with: attitudes by windows of epochs, velocities joined by lines, positions summed up."""
 
 from dataclasses import replace
+from typing import Any
 
-import jax
 import numpy as np
 
 from altijax.drives import imu_of, start_of
-from altijax.motion_estimate.intervals import MotionReadings, instants_at
+from altijax.motion_estimate.intervals import MotionReadings
 from altijax.motion_estimate.readings import motion_readings
 from altijax.motion_estimate.start import delay_by_windows, epochs_within, window_attitudes
 from altijax.recordings import Recording
 from altijax.vehicle.inertial import Trajectory
-from altijax.vehicle.measurements.doppler_velocity import GNSS_DELAY
+from altijax.vehicle.measurements.doppler_velocity import USUAL_DELAY
 from altijax.vehicle.parts import Rows
+from altijax.vehicle.readings import instants_of
 from altijax.vehicle.sensors import Use, layout_of
 
 _WINDOW = 15.0  # s
@@ -27,17 +28,16 @@ def first_trajectory(
 ) -> Trajectory:
     """The trajectory that a search begins with, at a delay of the receiver (s)."""
     layout, gyro = layout_of(use), "gyro" in use
-    t = np.asarray(jax.device_get(instants_at(readings, np.float64(delay))))
+    t = instants_of(readings, delay)
     by_gnss = "velocity" in rows
     if by_gnss:
-        started = replace(readings, v_gnss=rows["velocity"].value, std=rows["velocity"].std)
+        seen: dict[str, Any] = {"v_gnss": rows["velocity"].value, "std": rows["velocity"].std}
     else:
         velocity = _by_wheel(recording, t, gyro=gyro)
         distinct = np.append(True, np.diff(t) > 1e-9)
         std = np.where(distinct[:, None], np.full_like(velocity, _BY_WHEEL), np.inf)
-        started = replace(
-            readings, instant=t, delayed=distinct.astype(float), v_gnss=velocity, std=std, spacing=np.float64(1.0)
-        )
+        seen = {"instant": t, "delayed": distinct.astype(float), "v_gnss": velocity, "std": std, "spacing": np.ones(())}
+    started = replace(readings, **seen)
     steps = np.diff(t)
     window = epochs_within(_WINDOW / float(np.median(steps[steps > 1e-9]))) if gyro else 1
     prior = _ALONG if "course" in use or not gyro else _FREE
@@ -49,7 +49,8 @@ def first_trajectory(
     for name, rate in (("position", v), ("way", speed)):
         steps = 0.5 * (rate[1:] + rate[:-1]) * dt
         x[:, layout.at(name)] = np.concatenate([np.zeros_like(steps[:1]), np.cumsum(steps, 0)])
-    return Trajectory(C_nb=np.asarray(start.C_nb), x=x)
+    states: dict[str, Any] = {"C_nb": np.asarray(start.C_nb), "x": x}
+    return Trajectory(**states)
 
 
 def _by_wheel(recording: Recording, t: np.ndarray, *, gyro: bool) -> np.ndarray:
@@ -67,7 +68,6 @@ def _by_wheel(recording: Recording, t: np.ndarray, *, gyro: bool) -> np.ndarray:
     return np.stack([speed * np.cos(yaw), speed * np.sin(yaw), np.zeros_like(t)], -1)
 
 
-
 def receiver_delay(recording: Recording) -> float:
     """How late the receiver's stamps are, s: where windows of epochs, turned by the gyro, fit best."""
-    return delay_by_windows(motion_readings(recording, use_gyro=True, delay=GNSS_DELAY.mean))
+    return delay_by_windows(motion_readings(recording, use_gyro=True, delay=USUAL_DELAY))

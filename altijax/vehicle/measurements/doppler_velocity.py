@@ -10,7 +10,8 @@ from altijax.vehicle.parts import Instant, Kind, Level, Part, Rows, State, turni
 
 ANTENNA = Part(size=3, std=(1.0, 0.5, 1.0))
 """Where the antenna is, seen from the IMU, m."""
-GNSS_DELAY = Part(mean=0.1, std=0.3)
+USUAL_DELAY = 0.1
+GNSS_DELAY = Part(mean=USUAL_DELAY, std=0.3)
 """How late the receiver's stamps are, s."""
 
 # Standard deviation of a velocity whose receiver states none, before it is estimated, m/s.

@@ -1,14 +1,13 @@
 """Places of a GNSS receiver's antenna over ground, late, with errors that last."""
 
 import jax
-import jax.numpy as jnp
 import numpy as np
 import pymap3d
 
 from altijax.drives import start_of
 from altijax.recordings import Recording
-from altijax.vehicle.measurements.doppler_velocity import GNSS_DELAY, ANTENNA, means_at
-from altijax.vehicle.parts import Instant, Kind, Level, Part, Rows, State, turning_of
+from altijax.vehicle.measurements.doppler_velocity import ANTENNA, GNSS_DELAY, means_at
+from altijax.vehicle.parts import Instant, Kind, Level, Part, Rows, State
 
 # Of a single place of a receiver under open sky, m, half of it gone by the next epoch.
 _STD = 1.0
@@ -45,8 +44,8 @@ def origin_of(recording: Recording) -> tuple[float, float, float] | None:
     places = gnss[["lat", "lon"]].dropna()
     if not len(places):
         return None
-    heights = gnss["alt"].dropna() if "alt" in gnss else ()
-    return (*places.iloc[0].tolist(), float(heights.iloc[0]) if len(heights) else 0.0)
+    height = float(gnss["alt"].dropna().iloc[0]) if "alt" in gnss and gnss["alt"].notna().any() else 0.0
+    return float(places["lat"].iloc[0]), float(places["lon"].iloc[0]), height
 
 
 KIND = Kind(

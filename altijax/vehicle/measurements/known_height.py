@@ -7,6 +7,8 @@ import numpy as np
 from altijax.vehicle.measurements.doppler_velocity import means_at
 from altijax.vehicle.parts import Instant, Kind, Part, Rows, State
 
+# The datum is believed to be near the first known height: a vehicle may have climbed by so much until there, m.
+_CLIMBED = 300.0
 # Of a surveyed height at the place the vehicle is said to be, m.
 _STD = 0.02
 
@@ -26,5 +28,5 @@ KIND = Kind(
     rows=("height",),
     expected=expected,
     measured=lambda recording, t: None,
-    parts={"datum": Part(std=1e4)},
+    parts={"datum": Part(std=_CLIMBED)},
 )

@@ -63,6 +63,4 @@ def measured(recording: Recording, t: np.ndarray) -> Rows:
     return Rows(value=np.zeros((t.size, 6)), std=std, stamp=t)
 
 
-KIND = Kind(
-    rows=("rest_e", "rest_n", "rest_u", "rest_gx", "rest_gy", "rest_gz"), expected=expected, measured=measured
-)
+KIND = Kind(rows=("rest_e", "rest_n", "rest_u", "rest_gx", "rest_gy", "rest_gz"), expected=expected, measured=measured)
