@@ -54,6 +54,7 @@ def filter_states(
     x0: ArrayLike,
     P0: ArrayLike,
     used: ArrayLike | bool = True,
+    moving: int | None = None,
 ) -> Filtered:
     """Run the filter forward.
 
@@ -78,6 +79,9 @@ def filter_states(
     used : (time,), optional
         False where an instant only fills the arrays up: nothing is measured there, nothing changes after it, and no
         time is spent on it.
+    moving : int, optional
+        How many states, the first ones, others have a part in: each of the rest depends on itself alone, and less is
+        to be multiplied. All by default.
 
     Returns
     -------
@@ -116,7 +120,8 @@ def filter_states(
         x, P = state
         z, H, R, F, c, Q = inputs
         x_after, P_after, met = update(x, P, z, H, R)
-        return (F @ x_after + c, F @ P_after @ F.T + Q), (x, P, *met)
+        ahead = _times(F, _times(F, P_after, moving).T, moving)
+        return (_times(F, x_after[:, None], moving)[:, 0] + c, ahead + Q), (x, P, *met)
 
     def rest(state: tuple, inputs: tuple) -> tuple[tuple, tuple]:
         nothing, none = jnp.zeros((states, rows), x0.dtype), jnp.zeros(rows, x0.dtype)
@@ -155,7 +160,9 @@ class Adjoint:
     information_after: jax.Array
 
 
-def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered, used: ArrayLike | bool = True) -> Adjoint:
+def adjoint_states(
+    F: ArrayLike, H: ArrayLike, filtered: Filtered, used: ArrayLike | bool = True, moving: int | None = None
+) -> Adjoint:
     """Run backward over what `filter_states` found.
 
     Parameters
@@ -168,6 +175,8 @@ def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered, used: ArrayLi
         What the filter found with the same.
     used : (time,), optional
         As of `filter_states`; filling comes after all that is used.
+    moving : int, optional
+        As of `filter_states`.
 
     Returns
     -------
@@ -187,10 +196,13 @@ def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered, used: ArrayLi
     def advance(later: tuple, inputs: tuple) -> tuple:
         slope, information = later
         F, H, gain, innovation, precision = inputs
-        slope_after, information_after = F.T @ slope, F.T @ information @ F
-        kept = identity - gain @ H
-        slope = kept.T @ slope_after + H.T @ (precision @ innovation)
-        information = kept.T @ information_after @ kept + H.T @ precision @ H
+        slope_after = _transposed_times(F, slope[:, None], moving)[:, 0]
+        information_after = _transposed_times(F, _transposed_times(F, information, moving).T, moving)
+        slope = slope_after + H.T @ (precision @ innovation - gain.T @ slope_after)
+        # With (I - gain H) on both sides, multiplied out: rows are few.
+        by_gain = information_after @ gain
+        across = by_gain @ H
+        information = information_after - across - across.T + H.T @ (precision + gain.T @ by_gain) @ H
         information = 0.5 * (information + information.T)
         return (slope, information), (slope, information, slope_after, information_after)
 
@@ -203,6 +215,21 @@ def adjoint_states(F: ArrayLike, H: ArrayLike, filtered: Filtered, used: ArrayLi
     seen = (used, after, H, filtered.gain, filtered.innovation, filtered.precision)
     found: tuple[jax.Array, ...] = jax.lax.scan(step, start, seen, reverse=True)[1]
     return Adjoint(slope=found[0], information=found[1], slope_after=found[2], information_after=found[3])
+
+
+def _times(F: jax.Array, x: jax.Array, moving: int | None) -> jax.Array:
+    """F x, where rows of F from `moving` on are diagonal."""
+    if moving is None:
+        return F @ x
+    return jnp.concatenate([F[:moving] @ x, jnp.diagonal(F)[moving:, None] * x[moving:]])
+
+
+def _transposed_times(F: jax.Array, x: jax.Array, moving: int | None) -> jax.Array:
+    """The transpose of F times x, where rows of F from `moving` on are diagonal."""
+    if moving is None:
+        return F.T @ x
+    rest = jnp.diagonal(F)[moving:, None] * x[moving:]
+    return F[:moving].T @ x[:moving] + jnp.concatenate([jnp.zeros_like(x[:moving]), rest])
 
 
 def smooth_states(filtered: Filtered, adjoint: Adjoint) -> tuple[jax.Array, jax.Array]:

@@ -25,7 +25,7 @@ _UNSEEN_TURN, _UNSEEN_ACCELERATION = 0.5, 3.0
 # Attitude and velocity can be anything; positions and the way count from the first instant.
 PARTS = {
     "attitude": Part(size=3, std=2.0),
-    "velocity": Part(size=3, std=100.0),
+    "velocity": Part(size=3, std=10.0),
     "position": Part(size=3),
     "way": Part(),
     "accelerometer_bias": Part(size=3, std=0.3, walk="accelerometer_walk"),

@@ -18,7 +18,7 @@ from altijax.inference.layout import Layout
 from altijax.inference.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
 from altijax.rotations import rotvec_to_matrix
-from altijax.vehicle.inertial import Between, Trajectory, between_instants, moved, stationary, transitions
+from altijax.vehicle.inertial import MOVING, Between, Trajectory, between_instants, moved, stationary, transitions
 from altijax.vehicle.parts import Instant, Kind, Rows
 from altijax.vehicle.sensors import Use, kinds_of, layout_of, parts_of
 
@@ -138,8 +138,9 @@ def vehicle_pass(
     lasts = lasts | (jnp.append(duration, 0.0) > 0)
     # Filling comes last.
     used = jax.lax.cummax(lasts.astype(int), reverse=True) > 0
-    filtered = filter_states(**linear, used=used)
-    adjoint = adjoint_states(linear["F"], linear["H"], filtered, used)
+    moving = layout.at(MOVING[-1]).stop
+    filtered = filter_states(**linear, used=used, moving=moving)
+    adjoint = adjoint_states(linear["F"], linear["H"], filtered, used, moving)
     x, P = smooth_states(filtered, adjoint)
     gradients = likelihood_gradients(linear["F"], linear["H"], filtered, adjoint)
     (by_level,) = pull_back(gradients | {"H": jnp.zeros_like(linear["H"])})

@@ -53,9 +53,12 @@ def dense(model: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, float]:
     return (mean.ravel() + gain @ innovation).reshape(T, N), cov - gain @ S @ gain.T, float(density)
 
 
-def test_smoother_and_likelihood_are_those_of_the_dense_gaussian(model: dict[str, np.ndarray]) -> None:
-    filtered = filter_states(**model)
-    x, P = smooth_states(filtered, adjoint_states(model["F"], model["H"], filtered))
+@pytest.mark.parametrize("moving", [None, 3])
+def test_smoother_and_likelihood_are_those_of_the_dense_gaussian(
+    model: dict[str, np.ndarray], moving: int | None
+) -> None:
+    filtered = filter_states(**model, moving=moving)
+    x, P = smooth_states(filtered, adjoint_states(model["F"], model["H"], filtered, moving=moving))
     mean, cov, density = dense(model)
     np.testing.assert_allclose(x, mean, atol=1e-12)
     blocks = [cov[k * N : (k + 1) * N, k * N : (k + 1) * N] for k in range(T)]
