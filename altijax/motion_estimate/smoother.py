@@ -229,7 +229,7 @@ def motion_pass(
     lasts = jnp.any(there, 1) | (jnp.append(0.0, duration) > 0) | (jnp.append(duration, 0.0) > 0)
     # Filling comes last: a first instant that the delay has moved onto the next one is none.
     used = jax.lax.cummax(lasts.astype(int), reverse=True) > 0
-    filtered = filter_states(**linear, used=used)
+    filtered = filter_states(**linear, used=used, moving=None)
     adjoint = adjoint_states(linear["F"], linear["H"], filtered, used)
     x, P = smooth_states(filtered, adjoint)
     gradients = likelihood_gradients(linear["F"], linear["H"], filtered, adjoint)

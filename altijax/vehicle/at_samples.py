@@ -10,7 +10,8 @@ from scipy.spatial.transform import Rotation, Slerp
 from altijax.drives import imu_of, start_of
 from altijax.inference.layout import Layout
 from altijax.recordings import Recording
-from altijax.vehicle.inertial import MOVING, Between
+from altijax.vehicle.between import Between
+from altijax.vehicle.inertial import MOVING
 from altijax.vehicle.smoother import Fit
 
 _ANGLES, _VELOCITY, _POSITION = ("roll", "pitch", "heading"), ("v_e", "v_n", "v_u"), ("east", "north", "height")

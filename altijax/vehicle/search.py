@@ -13,7 +13,8 @@ from altijax.motion_estimate.intervals import MotionReadings
 from altijax.motion_estimate.start import quick_jit
 from altijax.recordings import Recording
 from altijax.stages import Stages
-from altijax.vehicle.inertial import Between, Trajectory
+from altijax.vehicle.between import Between
+from altijax.vehicle.inertial import Trajectory
 from altijax.vehicle.measurements import known_height
 from altijax.vehicle.parts import Rows
 from altijax.vehicle.readings import instants_of, readings_of

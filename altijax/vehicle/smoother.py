@@ -18,9 +18,11 @@ from altijax.inference.layout import Layout
 from altijax.inference.state_smoother import adjoint_states, filter_states, likelihood_gradients, smooth_states
 from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
 from altijax.rotations import rotvec_to_matrix
-from altijax.vehicle.inertial import MOVING, Between, Trajectory, between_instants, moved, stationary, transitions
+from altijax.vehicle.between import Between, between_instants
+from altijax.vehicle.inertial import MOVING, Trajectory, moved, stationary
 from altijax.vehicle.parts import Instant, Kind, Rows
 from altijax.vehicle.sensors import Use, kinds_of, layout_of, parts_of
+from altijax.vehicle.transitions import transitions
 
 # A measurement more than so many standard deviations from what all others say is trusted that much less.
 _GATE = 4.0
