@@ -1,6 +1,6 @@
 """The most probable motion and noise levels of a recording, from a start by windows of epochs or by wheels."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -33,6 +33,8 @@ _SHORTEST, _SHORTEST_FREE = 0.4, 0.1
 # Factor on the variances of wheels and the course while a first attitude may be off by a right angle.
 _EASED = 1e8
 _ROUNDS_OF_DOUBT = 3
+# How far, s, instants may move for a delay before what is measured on the IMU's clock is at other instants.
+_MOVED = 0.05
 # How far, as a logarithm, a round may move noise levels: the likelihood is that about the trajectory of the last ones.
 _REACH = 2.0
 # A start must be better than the one before by this much of a log-likelihood.
@@ -53,6 +55,10 @@ class Search:
         Measurements by kind.
     belief : Belief
         Of the first instant and the constants.
+    measured : callable
+        From a delay to the measurements at the instants that it makes.
+    rows_at : float
+        The delay that `rows` were made at, s.
     delay : float
         By how much the instants are moved for the receiver's delay, s.
     trajectory : Trajectory
@@ -71,6 +77,8 @@ class Search:
     readings: MotionReadings
     rows: dict[str, Rows]
     belief: Belief
+    measured: Callable[[float], dict[str, Rows]]
+    rows_at: float
     delay: float
     trajectory: Trajectory
     levels: dict[str, float]
@@ -80,7 +88,7 @@ class Search:
 
 
 def rows_at(
-    recording: Recording, use: Use, readings: MotionReadings, delay: float, heights: list[tuple[float, float]]
+    recording: Recording, use: Use, readings: MotionReadings, heights: list[tuple[float, float]], delay: float
 ) -> dict[str, Rows]:
     """Measurements by kind at the instants; nothing at those that only fill up."""
     stamped = np.asarray(readings.instant)
@@ -109,7 +117,8 @@ def begun(recording: Recording, use: Use, delay: float, belief: Belief, heights:
     longest = _LONGEST_EVEN if not gyro or "wheel" in use else _LONGEST
     shortest = _SHORTEST if "course" in use else _SHORTEST_FREE
     readings = readings_of(recording, use_gyro=gyro, delay=delay, shortest=shortest, longest=longest)
-    rows = rows_at(recording, use, readings, delay, heights)
+    measured = partial(rows_at, recording, use, readings, heights)
+    rows = measured(delay)
     layout = layout_of(use)
     start = first_trajectory(recording, use, readings, rows, delay)
     x = start.x + belief.mean * (np.abs(start.x).max(0) == 0)
@@ -121,6 +130,8 @@ def begun(recording: Recording, use: Use, delay: float, belief: Belief, heights:
         readings=jax.device_put(readings),
         rows=rows,
         belief=belief,
+        measured=measured,
+        rows_at=delay,
         delay=delay,
         trajectory=replace(start, x=x),
         levels={name: level.usual for name, level in levels_of(use).items()},
@@ -185,6 +196,8 @@ def passed(search: Search, passes: int, *, robust: bool = False) -> Search:
     trajectory, delay = search.trajectory, search.delay
     layout = layout_of(search.use)
     for _ in range(passes):
+        if abs(delay - search.rows_at) > _MOVED:
+            search = replace(search, rows=search.measured(delay), rows_at=delay)
         said = _between(search.use, search.readings, trajectory, np.float64(delay))
         fit = jax.device_get(_one(search, trajectory, delay, said, search.levels))
         trajectory = fit.trajectory
