@@ -124,14 +124,15 @@ def use_of(recording: Recording, use: Iterable[str] | None) -> Use:
         for name in wanted:
             if name not in SOURCES:
                 raise ValueError(f"use must be several of {', '.join(SOURCES)}; got {name!r}")
-            if not there[name]:
+            if not there[name] and name != "standstill":
                 raise ValueError(f"recording {recording.name!r} has nothing for use={name!r}")
     if not {"wheel", "velocity"} & set(wanted):
         raise ValueError(
             f"recording {recording.name!r}: a motion needs wheel speeds or GNSS velocities, and neither is "
             f"{'there: add a wheel.csv, pulses.csv or gnss.csv' if use is None else 'in use'}"
         )
-    return tuple(name for name in SOURCES if name in wanted)
+    # A vehicle that never stands has no standstill to be used.
+    return tuple(name for name in SOURCES if name in wanted and there[name])
 
 
 def _there(recording: Recording) -> dict[str, bool]:
