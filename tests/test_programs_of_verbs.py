@@ -29,7 +29,6 @@ VERBS: dict[str, Work] = {
     **{f"motion {m}": lambda r, m=m: estimate_motion(r, method=m) for m in ("epoch", "window")},
 }
 SLOW_VERBS: dict[str, Work] = {
-    "drive": estimate_drive,
     "motion batch": lambda r: estimate_motion(r, method="batch"),
     "motion batch, no gyro": lambda r: estimate_motion(r, method="batch", use_gyro=False),
 }
@@ -83,6 +82,12 @@ def test_a_calibration_compiles_eight_programs_at_most(name: str, recording: Rec
 @pytest.mark.parametrize("name", SLOW_VERBS)
 def test_a_search_compiles_five_programs_at_most(name: str, recording: Recording) -> None:
     assert_few(SLOW_VERBS[name], recording, 5)
+
+
+@pytest.mark.slow
+def test_a_drive_compiles_six_programs_at_most(recording: Recording) -> None:
+    """The delay of its receiver is found at the epochs, its first trajectory at instants that are closer."""
+    assert_few(estimate_drive, recording, 6)
 
 
 @pytest.mark.slow
