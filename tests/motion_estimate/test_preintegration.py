@@ -16,8 +16,8 @@ F_B = np.array([0.5, -0.3, 9.8]) + np.cumsum(0.2 * RNG.normal(size=(STEPS, 3)), 
 W_B = np.cumsum(0.05 * RNG.normal(size=(STEPS, 3)), 0)
 
 
-def gained(gyro: jax.Array, bias: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array]:
-    w_b, f_b = W_B * (1 + gyro[3:]) - gyro[:3], F_B - bias
+def gained(gyro: jax.Array, bias: jax.Array, turn: jax.Array, more: jax.Array) -> tuple[jax.Array, jax.Array]:
+    w_b, f_b = W_B + W_B @ gyro[3:].reshape(3, 3).T - gyro[:3], F_B + F_B @ more.T - bias
     C = relative_attitudes(w_b, LENGTHS)
     whole = preintegrate(f_b, w_b, C, turn, LENGTHS)
     return whole.C[-1], whole.velocity[-1]
@@ -42,18 +42,19 @@ def test_derivatives_are_those_of_differentiation() -> None:
     """To the size of the step, which is neglected within a step."""
     whole = preintegrate(F_B, W_B, relative_attitudes(W_B, LENGTHS), np.zeros(3), LENGTHS)
     C_end = whole.C[-1]
-    zeros = jnp.zeros(6), jnp.zeros(3), jnp.zeros(3)
+    zeros = jnp.zeros(12), jnp.zeros(3), jnp.zeros(3), jnp.zeros((3, 3))
 
-    def ends(gyro: jax.Array, bias: jax.Array, turn: jax.Array) -> tuple[jax.Array, jax.Array]:
-        C, velocity = gained(gyro, bias, turn)
+    def ends(*changes: jax.Array) -> tuple[jax.Array, jax.Array]:
+        C, velocity = gained(*changes)
         return matrix_to_rotvec(C @ C_end.T), velocity
 
-    turned, moved = jax.jit(jax.jacfwd(ends, argnums=(0, 1, 2)))(*zeros)
+    turned, moved = jax.jit(jax.jacfwd(ends, argnums=(0, 1, 2, 3)))(*zeros)
     np.testing.assert_allclose(whole.turn_by_gyro, turned[0], atol=2e-3)
-    by_gyro, by_bias, by_turn = moved
+    by_gyro, by_bias, by_turn, by_matrix = moved
     np.testing.assert_allclose(whole.velocity_by_gyro, by_gyro, atol=2e-2)
     np.testing.assert_allclose(whole.velocity_by_bias, by_bias, atol=1e-12)
     np.testing.assert_allclose(whole.velocity_by_turn, by_turn, atol=1e-12)
+    np.testing.assert_allclose(whole.velocity_by_matrix, by_matrix, atol=1e-12)
 
 
 def test_the_turn_ends_where_it_should() -> None:
