@@ -20,6 +20,9 @@ _BURSTING = 3.0
 # Samples on the grid: 11 hours at 100 Hz.
 _MOST_SAMPLES = 2**22
 
+# Standard deviation of a velocity whose receiver states none, before it is estimated, m/s.
+_UNSTATED = 0.1
+
 Array = jax.Array | np.ndarray
 
 
@@ -180,6 +183,39 @@ def speed_readings(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
         f"recording {recording.name!r} has neither wheel speeds nor GNSS velocities, and a speed is needed: "
         "add a wheel.csv, pulses.csv or gnss.csv"
     )
+
+
+def gnss_velocities(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+    """Velocities of the epochs that have a horizontal one.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an IMU.
+
+    Returns
+    -------
+    t : ndarray
+        (epochs,) Times from the first IMU sample, s.
+    velocity : ndarray
+        (epochs, 3) East, North and up, m/s; zero where there is none.
+    std : ndarray
+        (epochs, 3) Standard deviations as far as known beforehand, m/s; infinite where there is no velocity. Nothing at
+        all, None, where the recording has no GNSS.
+    """
+    if recording.gnss is None:
+        return None
+    gnss = recording.gnss.dropna(subset=["v_e", "v_n"])
+    velocity = gnss[["v_e", "v_n", "v_u"]].to_numpy(float)
+    std = np.full(velocity.shape, _UNSTATED)
+    for axis, name in enumerate(("sd_e", "sd_n", "sd_u")):
+        if name in gnss:
+            stated = gnss[name].to_numpy(float)
+            usable = np.isfinite(stated) & (stated > 0)
+            if usable.any():
+                std[:, axis] = np.where(usable, stated, np.median(stated[usable]))
+    std = np.where(np.isfinite(velocity), std, np.inf)
+    return gnss.index.to_numpy(float) - start_of(recording), np.nan_to_num(velocity), std
 
 
 def wheel_pair(recording: Recording) -> tuple[str, str] | None:

@@ -53,6 +53,32 @@ def supported(t: np.ndarray, t_samples: np.ndarray, max_gap: float) -> np.ndarra
     return on_sample | between
 
 
+def flanked(t: np.ndarray, t_samples: np.ndarray, usual: float) -> np.ndarray:
+    """Where samples lie close on both sides, or on one beyond the first and the last.
+
+    Parameters
+    ----------
+    t : (time,) s
+        Times asked for.
+    t_samples : (samples,) s
+        Times of the samples, not decreasing.
+    usual : float
+        Usual time between samples, s.
+
+    Returns
+    -------
+    flanked : (time,)
+        True where the samples before and after are at most five usual intervals apart, or two seconds; beyond the ends,
+        where the nearest one is at most two usual intervals away.
+    """
+    k = np.searchsorted(t_samples, t)
+    before = t - t_samples[np.clip(k - 1, 0, t_samples.size - 1)]
+    after = t_samples[np.clip(k, 0, t_samples.size - 1)] - t
+    beyond = (k == 0) | (k == t_samples.size)
+    near: np.ndarray = np.where(beyond, np.maximum(before, after) <= 2 * usual, before + after <= max(5 * usual, 2.0))
+    return near
+
+
 def means_between(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Means over intervals of samples, the trapezoid between two neighbours spread evenly over the time between them.
 

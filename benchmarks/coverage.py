@@ -14,23 +14,10 @@ import warnings
 import numpy as np
 import pandas as pd
 
-from altijax.samples.foreign_drives import MISMATCHES, foreign_drive
+from altijax.samples.foreign_drives import MISMATCHES, drive_errors, foreign_drive
 from altijax.vehicle.estimates import CONSISTENT, estimate_drive
 
 SETS = {"all": None, "no gyro": ("velocity", "course"), "GNSS and gyro": ("gyro", "velocity")}
-OUTPUTS = ("roll", "pitch", "heading", "v_e", "v_n", "v_u", "speed", "height")
-
-
-def errors(estimate: pd.DataFrame, reference: pd.DataFrame) -> pd.DataFrame:
-    """Errors of the outputs."""
-    truth = reference.assign(
-        speed=np.sqrt((reference[["v_e", "v_n", "v_u"]] ** 2).sum(axis=1)),
-        height=reference["alt"] - reference["alt"].iloc[0],
-    )
-    error = estimate[list(OUTPUTS)] - truth[list(OUTPUTS)]
-    angles = list(OUTPUTS[:3])
-    error[angles] = np.mod(error[angles] + np.pi, 2 * np.pi) - np.pi
-    return error
 
 
 def main(drives: int, mismatches: list[str]) -> None:
@@ -46,8 +33,8 @@ def main(drives: int, mismatches: list[str]) -> None:
                 estimate = estimate_drive(recording, use=use)
                 seconds.append(time.process_time() - begun)
                 distrusted += estimate.attrs["verdict"] != CONSISTENT
-                error = errors(estimate, recording.reference).iloc[10:]
-                bar = estimate[[f"{output}_std" for output in OUTPUTS]].iloc[10:].to_numpy()
+                error = drive_errors(estimate, recording).iloc[10:]
+                bar = estimate[[f"{output}_std" for output in error]].iloc[10:].to_numpy()
                 found.append((error, bar))
             error = pd.concat([pair[0] for pair in found])
             bar = np.concatenate([pair[1] for pair in found])

@@ -25,7 +25,9 @@ from altijax.motion_estimate.smoother import (
 )
 from altijax.motion_estimate.start import delay_by_windows, epochs_within, quick_jit, window_attitudes
 from altijax.recordings import Recording
+from altijax.series import flanked
 from altijax.stages import Stages, stages
+from altijax.vehicle.at_samples import angle_columns
 
 MOTION_METHODS = ("epoch", "window", "batch")
 
@@ -498,28 +500,9 @@ def _at_samples(
     velocity = np.diagonal(P, axis1=1, axis2=2)[:, 3:6] + (acceleration * bridge)[:, None]
     velocity = velocity + (rotation * bridge * (force * dt) ** 2 / 12)[:, None]
 
-    pitch = np.arcsin(np.clip(C_nb[:, 2, 0], -1, 1))
-    yaw = np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0])
-    columns = {
-        "roll": np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]),
-        "pitch": pitch,
-        "heading": np.mod(np.pi / 2 - yaw, 2 * np.pi),
-    }
+    columns, bars = angle_columns(C_nb, attitude)
     columns |= {name: np.interp(inside, knots, velocities[:, i]) for i, name in enumerate(("v_e", "v_n", "v_u"))}
-    # Small turns in axes that yaw with the body, to roll, pitch and yaw: upright poles have a roll of any size.
-    sin, cos = np.sin(yaw), np.cos(yaw)
-    cos_pitch = np.maximum(np.cos(pitch), 0.05)
-    zero, one = np.zeros_like(yaw), np.ones_like(yaw)
-    rows = [
-        [cos / cos_pitch, sin / cos_pitch, zero],
-        [sin, -cos, zero],
-        [-np.tan(np.clip(pitch, -1.5, 1.5)) * cos, -np.tan(np.clip(pitch, -1.5, 1.5)) * sin, one],
-    ]
-    for name, row in zip(("roll", "pitch", "heading"), rows, strict=True):
-        slope = np.stack(row, -1)
-        variance = np.einsum("ti,tij,tj->t", slope, attitude, slope)
-        # No angle is less certain than one of which nothing is known.
-        columns[f"{name}_std"] = np.minimum(np.sqrt(np.maximum(variance, 0)), np.pi / np.sqrt(3))
+    columns |= bars
     for i, name in enumerate(("v_e", "v_n", "v_u")):
         columns[f"{name}_std"] = np.sqrt(np.maximum(velocity[:, i], 0))
     return pd.DataFrame(columns, index=imu.index).assign(valid=_supported(readings, t, delay))
@@ -528,12 +511,6 @@ def _at_samples(
 def _supported(readings: MotionReadings, t: np.ndarray, delay: float) -> np.ndarray:
     """Where GNSS velocities lie close on both sides and the IMU has no gap."""
     epochs = readings.instant[np.isfinite(readings.std[:, 0])] - delay
-    longest = max(5 * float(readings.spacing), 2.0)
-    k = np.searchsorted(epochs, t)
-    before = t - epochs[np.clip(k - 1, 0, epochs.size - 1)]
-    after = epochs[np.clip(k, 0, epochs.size - 1)] - t
-    beyond = (k == 0) | (k == epochs.size)
-    near = np.where(beyond, np.maximum(before, after) <= 2 * float(readings.spacing), before + after <= longest)
     usual = float(np.median(np.diff(t)))
     gap = np.diff(t, prepend=t[0]) > max(5 * usual, 0.1)
-    return near & ~gap
+    return flanked(t, np.asarray(epochs), float(readings.spacing)) & ~gap

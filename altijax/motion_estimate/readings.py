@@ -4,17 +4,15 @@ from typing import Any
 
 import numpy as np
 
-from altijax.drives import gravity_at, imu_of, start_of
+from altijax.drives import gnss_velocities, gravity_at, imu_of, start_of
 from altijax.motion_estimate.intervals import MotionReadings
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 
-# Standard deviation of a velocity whose receiver states none, before it is estimated, m/s.
-_VELOCITY_STD = 0.1
-_ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
+_ACCELEROMETER, _GYRO = ["ax", "ay", "az"], ["gx", "gy", "gz"]
 # The smallest sizes that samples, instants and steps are filled up to, so that recordings of like length share what was
 # compiled, and what steps are rounded up to.
-_SAMPLES, _INSTANTS, _STEPS, _EVEN = 16384, 64, 16, 8
+_SAMPLES, INSTANTS, _STEPS, _EVEN = 16384, 64, 16, 8
 # Readings go on for as long as delays may yet move the last instants beyond them, s.
 _BEYOND = 1.0
 
@@ -47,18 +45,14 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longe
     t = imu.index.to_numpy(float) - start
     usual = float(np.median(np.diff(t)))
     gyro = imu[_GYRO].to_numpy(float) if use_gyro else np.zeros((t.size, 3))
-    gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
-    readings = np.concatenate([imu[_ACCELEROMETER].to_numpy(float), gyro, np.zeros((t.size, 1))], -1)
-    pad = bucket(t.size + int(np.ceil(_BEYOND / usual)), _SAMPLES) - t.size
-    t_padded = np.append(t, t[-1] + usual * np.arange(1, pad + 1))
-    readings = np.concatenate([readings, np.repeat(readings[-1:], pad, 0)])
-    areas = 0.5 * (readings[1:] + readings[:-1]) * np.diff(t_padded)[:, None]
-    sums = np.concatenate([np.zeros((1, 7)), np.cumsum(areas, 0)])
-    # A gap's indicator is a step, not a straight line: kept as a sum alone.
-    lost = np.where(np.append(gaps, np.zeros(pad, bool))[:-1], np.diff(t_padded), 0.0)
-    sums[:, 6] = np.append(0.0, np.cumsum(lost))
-
-    epochs, velocity, std = _epochs(recording, start)
+    readings = np.concatenate([imu[_ACCELEROMETER].to_numpy(float), gyro], -1)
+    found = gnss_velocities(recording)
+    if found is None:
+        raise ValueError(
+            f"recording {recording.name!r} has no GNSS velocities, which estimate_motion needs (wheel speeds have no "
+            "direction): add a gnss.csv with v_e, v_n or speed, course"
+        )
+    epochs, velocity, std = found
     inside = (epochs - delay >= 0) & (epochs - delay <= t[-1])
     if inside.sum() < 3:
         raise ValueError(
@@ -77,42 +71,66 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longe
     v_gnss = np.where(there[:, None], velocity[row], 0.0)
     std = np.where(there[:, None], std[row], np.inf)
     longest = float(np.max(np.diff(np.where(delayed > 0, instant - delay, instant))))
-    # As many steps as resolve the IMU's samples, an even number.
-    steps = int(np.ceil(longest / usual / _EVEN)) * _EVEN
-    size = bucket(instant.size, _INSTANTS)
-    arrays: dict[str, Any] = dict(
-        t=t_padded,
-        readings=readings,
-        sums=sums,
+    size = bucket(instant.size, INSTANTS)
+    arrays: dict[str, Any] = summed_readings(t, usual, readings) | dict(
         instant=padded(instant, size, t[-1]),
         delayed=padded(delayed, size, 0.0),
         v_gnss=padded(v_gnss, size, 0.0),
         std=padded(std, size, np.inf),
         spacing=np.float64(spacing),
-        share=np.minimum(np.arange(bucket(steps, _STEPS) + 1) / steps, 1.0),
+        share=even_shares(longest, usual),
         gravity=np.float64(gravity_at(recording)),
     )
     return MotionReadings(**arrays)
 
 
-def _epochs(recording: Recording, start: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Times, velocities and standard deviations of the epochs that have a horizontal velocity."""
-    if recording.gnss is None:
-        raise ValueError(
-            f"recording {recording.name!r} has no GNSS velocities, which estimate_motion needs (wheel speeds have no "
-            "direction): add a gnss.csv with v_e, v_n or speed, course"
-        )
-    gnss = recording.gnss.dropna(subset=["v_e", "v_n"])
-    velocity = gnss[_VELOCITY].to_numpy(float)
-    std = np.full(velocity.shape, _VELOCITY_STD)
-    for axis, name in enumerate(("sd_e", "sd_n", "sd_u")):
-        if name in gnss:
-            stated = gnss[name].to_numpy(float)
-            usable = np.isfinite(stated) & (stated > 0)
-            if usable.any():
-                std[:, axis] = np.where(usable, stated, np.median(stated[usable]))
-    std = np.where(np.isfinite(velocity), std, np.inf)
-    return gnss.index.to_numpy(float) - start, np.nan_to_num(velocity), std
+def summed_readings(t: np.ndarray, usual: float, readings: np.ndarray) -> dict[str, np.ndarray]:
+    """Readings with their integrals, filled up: what `MotionReadings` calls t, readings and sums.
+
+    Parameters
+    ----------
+    t : (samples,) s
+        Times of the IMU.
+    usual : float
+        Usual time between them, s.
+    readings : (samples, 6)
+        Specific force (m/s^2) and angular rate (rad/s).
+
+    Returns
+    -------
+    arrays : dict of str to ndarray
+        By these names.
+    """
+    gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
+    readings = np.concatenate([readings, np.zeros((t.size, 1))], -1)
+    pad = bucket(t.size + int(np.ceil(_BEYOND / usual)), _SAMPLES) - t.size
+    t = np.append(t, t[-1] + usual * np.arange(1, pad + 1))
+    readings = np.concatenate([readings, np.repeat(readings[-1:], pad, 0)])
+    areas = 0.5 * (readings[1:] + readings[:-1]) * np.diff(t)[:, None]
+    sums = np.concatenate([np.zeros((1, 7)), np.cumsum(areas, 0)])
+    # A gap's indicator is a step, not a straight line: kept as a sum alone.
+    lost = np.where(np.append(gaps, np.zeros(pad, bool))[:-1], np.diff(t), 0.0)
+    sums[:, 6] = np.append(0.0, np.cumsum(lost))
+    return {"t": t, "readings": readings, "sums": sums}
+
+
+def even_shares(longest: float, usual: float) -> np.ndarray:
+    """Where the steps of an interval begin and end, from 0 to 1, filled up: as many as resolve the IMU's samples.
+
+    Parameters
+    ----------
+    longest : float
+        The longest interval, s.
+    usual : float
+        Usual time between samples, s.
+
+    Returns
+    -------
+    share : ndarray
+        (steps + 1,) Steps that only fill up have no length; the others are an even number.
+    """
+    steps = int(np.ceil(longest / usual / _EVEN)) * _EVEN
+    return np.minimum(np.arange(bucket(steps, _STEPS) + 1) / steps, 1.0)
 
 
 def _with_instants_between(

@@ -112,6 +112,32 @@ def foreign_drive(seed: int, mismatch: str = "nominal", **changed: Any) -> Recor
     return _drive(seed, **(_constants(seed) | MISMATCHES[mismatch] | changed))
 
 
+def drive_errors(estimate: pd.DataFrame, recording: Recording) -> pd.DataFrame:
+    """By how much an estimate of such a drive is off: estimate less truth.
+
+    Parameters
+    ----------
+    estimate : DataFrame
+        Of `estimate_drive`.
+    recording : Recording
+        The drive.
+
+    Returns
+    -------
+    errors : DataFrame
+        Of roll, pitch, heading (rad), v_e, v_n, v_u, speed (m/s) and height (m).
+    """
+    reference = recording.reference
+    assert reference is not None
+    velocity, angles = ["v_e", "v_n", "v_u"], ["roll", "pitch", "heading"]
+    truth = reference[angles + velocity].assign(
+        speed=np.sqrt((reference[velocity] ** 2).sum(axis=1)), height=reference["alt"] - reference["alt"].iloc[0]
+    )
+    error = estimate[list(truth)] - truth
+    error[angles] = np.mod(error[angles] + np.pi, 2 * np.pi) - np.pi
+    return error
+
+
 def _drive(
     seed,
     duration=90.0,

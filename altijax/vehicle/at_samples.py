@@ -14,7 +14,7 @@ from altijax.vehicle.between import Between
 from altijax.vehicle.inertial import MOVING
 from altijax.vehicle.smoother import Fit
 
-_ANGLES, _VELOCITY, _POSITION = ("roll", "pitch", "heading"), ("v_e", "v_n", "v_u"), ("east", "north", "height")
+_VELOCITY, _POSITION = ("v_e", "v_n", "v_u"), ("east", "north", "height")
 # Where the pitch is steeper than this cosine, roll and heading are one angle.
 _UPRIGHT = 0.05
 
@@ -130,28 +130,49 @@ def _skew(v: np.ndarray) -> np.ndarray:
     return np.stack(rows, -2)
 
 
-def as_table(recording: Recording, samples: Samples) -> pd.DataFrame:
-    """The motion as columns: angles, velocity and position, each with its standard deviation, and the way."""
-    C_nb, P = samples.C_nb, samples.covariance
+def angle_columns(C_nb: np.ndarray, covariance: np.ndarray) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Roll, pitch and heading of attitudes, and the standard deviation of each.
+
+    Parameters
+    ----------
+    C_nb : (samples, 3, 3)
+        Attitudes.
+    covariance : (samples, 3, 3) rad^2
+        Of their errors, rotation vectors in navigation axes.
+
+    Returns
+    -------
+    angles, bars : dict of str to (samples,) rad
+        By name of the column, that of a bar with ``_std``.
+    """
     pitch = np.arcsin(np.clip(C_nb[:, 2, 0], -1, 1))
     yaw = np.arctan2(C_nb[:, 1, 0], C_nb[:, 0, 0])
-    columns = {
+    angles = {
         "roll": np.arctan2(C_nb[:, 2, 1], C_nb[:, 2, 2]),
         "pitch": pitch,
         "heading": np.mod(np.pi / 2 - yaw, 2 * np.pi),
     }
-    columns |= dict(zip(_VELOCITY, samples.v_n.T, strict=True)) | dict(zip(_POSITION, samples.p_n.T, strict=True))
-    columns["distance"] = samples.way
     # Small turns in axes that yaw with the body, to roll, pitch and yaw: upright poles have a roll of any size.
     sin, cos = np.sin(yaw), np.cos(yaw)
     cos_pitch, tan_pitch = np.maximum(np.cos(pitch), _UPRIGHT), np.tan(np.clip(pitch, -1.5, 1.5))
     zero, one = np.zeros_like(yaw), np.ones_like(yaw)
     rows = ([cos / cos_pitch, sin / cos_pitch, zero], [sin, -cos, zero], [-tan_pitch * cos, -tan_pitch * sin, one])
-    for name, row in zip(_ANGLES, rows, strict=True):
+    bars = {}
+    for name, row in zip(angles, rows, strict=True):
         slope = np.stack(row, -1)
-        variance = np.einsum("ti,tij,tj->t", slope, P[:, :3, :3], slope)
+        variance = np.einsum("ti,tij,tj->t", slope, covariance, slope)
         # No angle is less certain than one of which nothing is known.
-        columns[f"{name}_std"] = np.minimum(np.sqrt(np.maximum(variance, 0)), np.pi / np.sqrt(3))
+        bars[f"{name}_std"] = np.minimum(np.sqrt(np.maximum(variance, 0)), np.pi / np.sqrt(3))
+    return angles, bars
+
+
+def as_table(recording: Recording, samples: Samples) -> pd.DataFrame:
+    """The motion as columns: angles, velocity and position, each with its standard deviation, and the way."""
+    P = samples.covariance
+    columns, bars = angle_columns(samples.C_nb, P[:, :3, :3])
+    columns |= dict(zip(_VELOCITY, samples.v_n.T, strict=True)) | dict(zip(_POSITION, samples.p_n.T, strict=True))
+    columns["distance"] = samples.way
+    columns |= bars
     std = np.sqrt(np.maximum(np.diagonal(P, axis1=1, axis2=2), 0))
     columns |= {f"{name}_std": std[:, 3 + i] for i, name in enumerate((*_VELOCITY, *_POSITION, "distance"))}
     speed = np.linalg.norm(samples.v_n, axis=1)

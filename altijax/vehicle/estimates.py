@@ -11,17 +11,19 @@ import pymap3d
 from scipy.spatial.transform import Rotation
 
 from altijax.calibration.records import Calibration
-from altijax.drives import imu_of, speed_readings, start_of, usual_step
+from altijax.drives import gnss_velocities, imu_of, speed_readings, start_of, usual_step
 from altijax.recordings import Recording
+from altijax.series import flanked
 from altijax.stages import Stages, stages
 from altijax.vehicle.at_samples import Samples, as_table, at_samples
 from altijax.vehicle.beliefs import belief_of
+from altijax.vehicle.between import Between
 from altijax.vehicle.inertial import MOVING
 from altijax.vehicle.measurements import standstill
-from altijax.vehicle.measurements.doppler_velocity import USUAL_DELAY, velocities
+from altijax.vehicle.measurements.doppler_velocity import USUAL_DELAY
 from altijax.vehicle.measurements.gnss_position import origin_of
 from altijax.vehicle.mounting import mounting_of
-from altijax.vehicle.search import Search, best_start, likely, said_between
+from altijax.vehicle.search import Search, best_start, fit_of, likely, said_between
 from altijax.vehicle.sensors import Use, kinds_of, layout_of, parts_of
 from altijax.vehicle.start import receiver_delay
 
@@ -98,9 +100,12 @@ def estimate_drive(
         turned = _turned(recording, mounting)
         search = smoothed(turned, sources, calibration, heights, stage)
         stage("between the instants")
-        samples = _samples(turned, search)
+        said = said_between(search)
+        samples = at_samples(turned, layout_of(search.use), fit_of(search), said, search.levels)
     samples = replace(samples, C_nb=samples.C_nb @ mounting.as_matrix())
-    estimate = as_table(recording, samples).assign(**_elevation(search, samples), **_places(recording, search, samples))
+    estimate = as_table(recording, samples).assign(
+        **_elevation(search, said, samples), **_places(recording, search, samples)
+    )
     estimate["valid"] = _supported(recording, sources)
     estimate.attrs.update(summary(search, start))
     if estimate.attrs["verdict"] != CONSISTENT:
@@ -138,7 +143,7 @@ def use_of(recording: Recording, use: Iterable[str] | None) -> Use:
 def _there(recording: Recording) -> dict[str, bool]:
     imu = imu_of(recording)
     end = float(imu.index[-1]) - start_of(recording)
-    found = velocities(recording)
+    found = gnss_velocities(recording)
     return {
         "gyro": "gx" in imu,
         "wheel": recording.wheel is not None,
@@ -194,23 +199,17 @@ def _turned(recording: Recording, mounting: Rotation) -> Recording:
     return replace(recording, imu=imu)
 
 
-def _samples(recording: Recording, search: Search) -> Samples:
-    assert search.fit is not None
-    return at_samples(recording, layout_of(search.use), search.fit, said_between(search), search.levels)
-
-
-def _elevation(search: Search, samples: Samples) -> dict[str, np.ndarray]:
+def _elevation(search: Search, said: Between, samples: Samples) -> dict[str, np.ndarray]:
     """Elevation above the datum of known heights, and its standard deviation; without any, of the height itself."""
     layout = layout_of(search.use)
     up = samples.p_n[:, 2]
     std = np.sqrt(np.maximum(samples.covariance[:, 8, 8], 0))
     if "datum" not in layout:
         return {"elevation": up, "elevation_std": std}
-    assert search.fit is not None
-    datum = float(search.fit.trajectory.x[-1, layout.at("datum")][0])
+    fit = fit_of(search)
+    datum = float(fit.trajectory.x[-1, layout.at("datum")][0])
     both = [layout.at("position").start + 2, layout.at("datum").start]
-    said = said_between(search)
-    variance = np.asarray(search.fit.covariance)[:, both][:, :, both].sum((1, 2))
+    variance = np.asarray(fit.covariance)[:, both][:, :, both].sum((1, 2))
     at_all = np.interp(samples.t, said.instants, variance)
     return {
         "elevation": up + datum,
@@ -226,8 +225,7 @@ def _places(recording: Recording, search: Search, samples: Samples) -> dict[str,
     layout = layout_of(search.use)
     east, north = samples.p_n[:, 0], samples.p_n[:, 1]
     if "place" in layout:
-        assert search.fit is not None
-        offset = np.asarray(search.fit.trajectory.x[-1, layout.at("place")])
+        offset = np.asarray(fit_of(search).trajectory.x[-1, layout.at("place")])
     else:
         gnss = recording.gnss
         assert gnss is not None
@@ -244,26 +242,21 @@ def _supported(recording: Recording, sources: Use) -> np.ndarray:
     streams = []
     if "wheel" in sources and recording.wheel is not None:
         streams.append(recording.wheel["speed"].dropna().index.to_numpy(float))
-    found = velocities(recording)
+    found = gnss_velocities(recording)
     if "velocity" in sources and found is not None:
         streams.append(found[0] + start_of(recording))
     for stamps in streams:
-        usual = usual_step(stamps) if stamps.size > 1 else 1.0
-        k = np.searchsorted(stamps, t)
-        before = t - stamps[np.clip(k - 1, 0, stamps.size - 1)]
-        after = stamps[np.clip(k, 0, stamps.size - 1)] - t
-        beyond = (k == 0) | (k == stamps.size)
-        near |= np.where(beyond, np.maximum(before, after) <= 2 * usual, before + after <= max(5 * usual, 2.0))
+        near |= flanked(t, stamps, usual_step(stamps) if stamps.size > 1 else 1.0)
     usual = usual_step(t - t[0])
     return near & ~(np.diff(t, prepend=t[0]) > max(5 * usual, 0.1))
 
 
 def summary(search: Search, start: float) -> dict[str, object]:
     """What a search has found beside the motion."""
-    assert search.fit is not None
+    fit = fit_of(search)
     layout, parts = layout_of(search.use), parts_of(search.use)
-    value = np.asarray(search.fit.trajectory.x).mean(0)
-    std = np.sqrt(np.maximum(np.diagonal(search.fit.covariance[-1]), 0))
+    value = np.asarray(fit.trajectory.x).mean(0)
+    std = np.sqrt(np.maximum(np.diagonal(fit.covariance[-1]), 0))
     constants: dict[str, tuple[float, float]] = {}
     for name, part in parts.items():
         if name in MOVING or part.time:
@@ -274,7 +267,7 @@ def summary(search: Search, start: float) -> dict[str, object]:
     nis, rejected = {}, []
     for name, kind in kinds_of(search.use).items():
         there = np.isfinite(search.rows[name].std)
-        surprise, doubt = np.asarray(search.fit.surprise[name]), search.doubt[name]
+        surprise, doubt = np.asarray(fit.surprise[name]), search.doubt[name]
         if kind.factor and there.any():
             nis[name] = float(np.mean(surprise[there] ** 2))
         for k, row in np.argwhere(there & (doubt > 1)):

@@ -4,14 +4,11 @@ from typing import Any
 
 import numpy as np
 
-from altijax.drives import gravity_at, imu_of, start_of, usual_step, without_bursts
+from altijax.drives import gnss_velocities, gravity_at, imu_of, start_of, usual_step, without_bursts
 from altijax.motion_estimate.intervals import MotionReadings
+from altijax.motion_estimate.readings import INSTANTS, even_shares, summed_readings
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
-from altijax.vehicle.measurements.doppler_velocity import velocities
-
-_SAMPLES, _INSTANTS, _STEPS, _EVEN = 16384, 64, 16, 8
-_BEYOND = 1.0
 
 
 def readings_of(
@@ -22,31 +19,18 @@ def readings_of(
     t = without_bursts(imu.index.to_numpy(float) - start)
     usual = usual_step(t)
     gyro = imu[["gx", "gy", "gz"]].to_numpy(float) if use_gyro else np.zeros((t.size, 3))
-    gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
-    readings = np.concatenate([imu[["ax", "ay", "az"]].to_numpy(float), gyro, np.zeros((t.size, 1))], -1)
-    pad = bucket(t.size + int(np.ceil(_BEYOND / usual)), _SAMPLES) - t.size
-    t_padded = np.append(t, t[-1] + usual * np.arange(1, pad + 1))
-    readings = np.concatenate([readings, np.repeat(readings[-1:], pad, 0)])
-    areas = 0.5 * (readings[1:] + readings[:-1]) * np.diff(t_padded)[:, None]
-    sums = np.concatenate([np.zeros((1, 7)), np.cumsum(areas, 0)])
-    # A gap's indicator is a step, not a straight line: kept as a sum alone.
-    sums[:, 6] = np.append(0.0, np.cumsum(np.where(np.append(gaps, np.zeros(pad, bool))[:-1], np.diff(t_padded), 0.0)))
-
+    readings = np.concatenate([imu[["ax", "ay", "az"]].to_numpy(float), gyro], -1)
     epochs = _epochs(recording, t[-1], delay, shortest)
     instant, delayed = _instants(epochs, t[-1], delay, longest)
     widest = float(np.max(np.diff(np.where(delayed > 0, instant - delay, instant))))
-    steps = int(np.ceil(widest / usual / _EVEN)) * _EVEN
-    size = bucket(instant.size, _INSTANTS)
-    arrays: dict[str, Any] = dict(
-        t=t_padded,
-        readings=readings,
-        sums=sums,
+    size = bucket(instant.size, INSTANTS)
+    arrays: dict[str, Any] = summed_readings(t, usual, readings) | dict(
         instant=padded(instant, size, t[-1]),
         delayed=padded(delayed, size, 0.0),
         v_gnss=np.zeros((size, 3)),
         std=np.full((size, 3), np.inf),
         spacing=np.float64(np.median(np.diff(epochs)) if epochs.size > 1 else longest),
-        share=np.minimum(np.arange(bucket(steps, _STEPS) + 1) / steps, 1.0),
+        share=even_shares(widest, usual),
         gravity=np.float64(gravity_at(recording)),
     )
     return MotionReadings(**arrays)
@@ -61,7 +45,7 @@ def instants_of(readings: MotionReadings, delay: float) -> np.ndarray:
 
 def _epochs(recording: Recording, end: float, delay: float, shortest: float) -> np.ndarray:
     """Times of the epochs within the IMU's span, on the receiver's clock, none too close to the one before."""
-    found = velocities(recording)
+    found = gnss_velocities(recording)
     if found is None:
         return np.empty(0)
     epochs = found[0]

@@ -230,12 +230,17 @@ def said_between(search: Search) -> Between:
     return jax.device_get(_between(search.use, search.readings, search.trajectory, np.float64(search.delay)))
 
 
+def fit_of(search: Search) -> Fit:
+    """The last pass of a search that has had one."""
+    assert search.fit is not None
+    return search.fit
+
+
 def objective_of(search: Search) -> float:
     """Minus the logarithm of the posterior probability of the levels, about the last trajectory."""
-    assert search.fit is not None
     usual = levels_of(search.use)
     off = [np.log(level / usual[name].usual) / usual[name].spread for name, level in search.levels.items()]
-    return 0.5 * float(np.square(off).sum()) - float(search.fit.log_likelihood)
+    return 0.5 * float(np.square(off).sum()) - float(fit_of(search).log_likelihood)
 
 
 def likely(search: Search, stage: Stages, rounds: int = 6) -> Search:
@@ -259,5 +264,5 @@ def likely(search: Search, stage: Stages, rounds: int = 6) -> Search:
 
 def _likelihood(search: Search, said: Between, levels: Mapping[str, float]) -> tuple[float, Mapping[str, float]]:
     """Logarithm of the likelihood of levels about the trajectory of a search, and its derivative by each."""
-    fit = jax.device_get(_one(search, search.trajectory, search.delay, said, levels))
+    fit = _one(search, search.trajectory, search.delay, said, levels)
     return float(fit.log_likelihood), {name: float(slope) for name, slope in fit.by_level.items()}

@@ -11,7 +11,7 @@ import pytest
 
 from altijax.datasets import load_dataset
 from altijax.recordings import Recording
-from altijax.samples.foreign_drives import foreign_drive
+from altijax.samples.foreign_drives import drive_errors, foreign_drive
 from altijax.vehicle.estimates import CONSISTENT, estimate_drive
 from tests.vehicle.made import cut
 from tests.vehicle.test_mounting import mounted
@@ -37,15 +37,8 @@ def estimate(name: str) -> pd.DataFrame:
 
 def normalised(found: pd.DataFrame, recording: Recording) -> pd.DataFrame:
     """Errors in standard deviations: angles, velocities, speed and height."""
-    reference = recording.reference
-    truth = reference[["roll", "pitch", "heading", "v_e", "v_n", "v_u"]].assign(
-        speed=np.sqrt((reference[["v_e", "v_n", "v_u"]] ** 2).sum(axis=1)),
-        height=reference["alt"] - reference["alt"].iloc[0],
-    )
-    error = found[list(truth)] - truth
-    angles = ["roll", "pitch", "heading"]
-    error[angles] = np.mod(error[angles] + np.pi, 2 * np.pi) - np.pi
-    return error / found[[f"{name}_std" for name in truth]].to_numpy()
+    error = drive_errors(found, recording)
+    return error / found[[f"{name}_std" for name in error]].to_numpy()
 
 
 @pytest.mark.slow

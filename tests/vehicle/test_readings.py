@@ -1,5 +1,7 @@
 """Instants: at the epochs, dense enough, on the right clock."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -29,7 +31,5 @@ def test_instants_cover_the_imu_and_move_with_the_delay() -> None:
 
 
 def test_without_a_receiver_all_is_on_the_clock_of_the_imu() -> None:
-    from dataclasses import replace
-
     readings = readings_of(replace(short_drive(), gnss=None), use_gyro=True, delay=0.0, shortest=0.4, longest=0.5)
     assert not np.asarray(readings.delayed).any()

@@ -4,7 +4,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from altijax.drives import start_of
+from altijax.drives import gnss_velocities
 from altijax.recordings import Recording
 from altijax.vehicle.parts import Instant, Kind, Level, Part, Rows, State, turning_of
 
@@ -14,8 +14,6 @@ USUAL_DELAY = 0.1
 GNSS_DELAY = Part(mean=USUAL_DELAY, std=0.3)
 """How late the receiver's stamps are, s."""
 
-# Standard deviation of a velocity whose receiver states none, before it is estimated, m/s.
-_UNSTATED = 0.1
 # Velocities this many usual intervals away from an instant are not of it.
 _HALF = 0.5
 
@@ -31,28 +29,11 @@ def expected(state: State, at: Instant, lead: jax.Array) -> jax.Array:
 
 def measured(recording: Recording, t: np.ndarray) -> Rows | None:
     """Means of the velocities that lie closer to an instant, on the receiver's clock, than to any other."""
-    found = velocities(recording)
+    found = gnss_velocities(recording)
     if found is None:
         return None
     stamp, value, std = found
     return means_at(t, stamp, value, std, _HALF * np.median(np.diff(t)))
-
-
-def velocities(recording: Recording) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-    """Times, velocities and standard deviations of the epochs that have a horizontal velocity."""
-    if recording.gnss is None:
-        return None
-    gnss = recording.gnss.dropna(subset=["v_e", "v_n"])
-    value = gnss[["v_e", "v_n", "v_u"]].to_numpy(float)
-    std = np.full(value.shape, _UNSTATED)
-    for axis, name in enumerate(("sd_e", "sd_n", "sd_u")):
-        if name in gnss:
-            stated = gnss[name].to_numpy(float)
-            usable = np.isfinite(stated) & (stated > 0)
-            if usable.any():
-                std[:, axis] = np.where(usable, stated, np.median(stated[usable]))
-    std = np.where(np.isfinite(value), std, np.inf)
-    return gnss.index.to_numpy(float) - start_of(recording), np.nan_to_num(value), std
 
 
 def means_at(t: np.ndarray, stamp: np.ndarray, value: np.ndarray, std: np.ndarray, reach: float) -> Rows:

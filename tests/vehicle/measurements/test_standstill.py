@@ -1,5 +1,7 @@
 """Standstills are found, and nothing else is taken for one."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from altijax.datasets import load_dataset
@@ -24,8 +26,6 @@ def test_only_what_stands_is_still() -> None:
 
 
 def test_without_a_gyro_nothing_is_said_to_stand() -> None:
-    from dataclasses import replace
-
     recording = load_dataset("hill-road")
     bare = replace(recording, imu=recording.imu[["ax", "ay", "az"]])
     assert not still(bare, np.arange(0.0, 90.0)).any()
