@@ -121,6 +121,9 @@ from .estimates import (
     score_motion as score_motion,
     withheld_gnss_errors as withheld_gnss_errors,
 )
+from .formats.registry import (
+    register_format as register_format,
+)
 from .instruments import (
     DOPPLER_1_HZ as DOPPLER_1_HZ,
     FIBRE_OPTIC_GYRO as FIBRE_OPTIC_GYRO,

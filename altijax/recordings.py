@@ -3,14 +3,14 @@
 import html
 import math
 import warnings
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from altijax.formats.logs import Log, is_comma2k19, read_comma2k19, read_ulog
+from altijax.formats.registry import described, format_of
 from altijax.formats.stream_checks import (
     RecordingError,
     RecordingWarning,
@@ -29,15 +29,13 @@ from altijax.formats.tidy_folder import (
     QUANTITIES,
     WHEELS,
     check_units,
-    is_tidy_folder,
-    read_tidy_folder,
+    in_si_units,
     wheel_from_pulses,
 )
-from altijax.formats.ublox import read_ubx
+from altijax.formats.zip_files import unpacked
 
 _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
 _STREAMS = ("imu", "wheel", "gnss", "reference")
-_LOG_READERS = {".ulg": read_ulog, ".ubx": read_ubx}
 _NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
     "imu": (("ax", "ay", "az"),),
     "wheel": (("speed",), *((name,) for name in WHEELS)),
@@ -177,15 +175,14 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
         axes_to_matrix(axes)
     problems: list[str] = []
     notes: list[str] = []
-    reader = _log_reader(path)
-    if reader:
-        if units:
+    with unpacked(path) as place:
+        form, place = format_of(place)
+        if form.fixes_units and units:
             raise ValueError(f"units is for a tidy folder; the format of {path} fixes its units")
-        tables, sheet = reader(path, problems, notes)
-        stated: Collection[str] = QUANTITIES
-    else:
-        tables, sheet = read_tidy_folder(path, units, problems)
-        stated = units.keys()
+        tables, sheet = form.read(place, problems, notes)
+    tables = described(tables, place, problems)
+    in_si_units(tables, units)
+    stated: Collection[str] = QUANTITIES if form.fixes_units else units.keys()
     if axes is None:
         axes = sheet.get("axes", "FLU")
         try:
@@ -207,7 +204,7 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
         if frame is not None:
             frame.attrs = {}
     return Recording(
-        name=sheet.get("name", path.resolve().name),
+        name=sheet.get("name", place.resolve().name),
         description=sheet.get("description", ""),
         **streams,
         axes=axes,
@@ -266,23 +263,6 @@ def _formatted(recording: Recording) -> pd.DataFrame:
     forms = {"rate": "{:.1f} Hz", "dt_5": "{:.4f} s", "dt_95": "{:.4f} s", "longest_gap": "{:.2f} s"}
     forms |= dict.fromkeys(("first", "last", "duration"), "{:.2f} s")
     return table.assign(**{name: table[name].map(form.format) for name, form in forms.items() if len(table)})
-
-
-def _log_reader(path: Path) -> Callable[[Path, list[str], list[str]], Log] | None:
-    """The reader of a log of another make, None for a tidy folder; raises for what is neither."""
-    if not path.exists():
-        raise FileNotFoundError(f"there is no file or folder {path}")
-    if path.is_file() and path.suffix.lower() in _LOG_READERS:
-        return _LOG_READERS[path.suffix.lower()]
-    if is_comma2k19(path):
-        return read_comma2k19
-    if path.is_dir() and is_tidy_folder(path):
-        return None
-    found = "a file" if path.is_file() else ", ".join(sorted(file.name for file in path.iterdir())) or "an empty folder"
-    raise RecordingError(
-        f"{path} is not a recording: expected a folder with imu.csv (and recording.toml, wheel.csv, gnss.csv, "
-        f"reference.csv), a comma2k19 segment (a folder with processed_log), a .ulg or a .ubx file; found {found}"
-    )
 
 
 def _stream(

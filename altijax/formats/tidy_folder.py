@@ -16,6 +16,7 @@ import pandas as pd
 
 from altijax.constants import GAL, STANDARD_GRAVITY
 from altijax.formats.stream_checks import SPEED_UNITS, RecordingError, check_overlap, clean_rows
+from altijax.formats.tables import Log
 from altijax.padding import bucket, padded
 from altijax.wheels import speed_from_pulses, standstill_from_pulses
 
@@ -53,15 +54,13 @@ QUANTITIES = tuple(_UNITS)
 """Quantities that may be stored in other units."""
 
 
-def is_tidy_folder(folder: Path) -> bool:
-    """Whether a folder holds a recording.toml or one of the streams' files."""
-    return (folder / "recording.toml").is_file() or any(_files(folder, stream) for stream in COLUMNS)
+def reads(path: Path) -> bool:
+    """Whether a path is a folder that holds a recording.toml or one of the streams' files."""
+    return (path / "recording.toml").is_file() or any(_files(path, stream) for stream in COLUMNS)
 
 
-def read_tidy_folder(
-    folder: Path, units: Mapping[str, str], problems: list[str]
-) -> tuple[dict[str, pd.DataFrame], dict[str, Any]]:
-    """Tables of the streams, in SI units and sensor axes, and what recording.toml says."""
+def read(folder: Path, problems: list[str], notes: list[str]) -> Log:
+    """Tables of the streams in the units of the files and in sensor axes, and what recording.toml says."""
     sheet = _read_sheet(folder, problems)
     tables = {}
     for stream in COLUMNS:
@@ -82,7 +81,6 @@ def read_tidy_folder(
     if "imu" not in tables:
         found = ", ".join(sorted(file.name for file in folder.iterdir())) or "nothing"
         raise RecordingError(f"{folder}: imu.csv (or .csv.gz, .parquet) is missing; found {found}")
-    _scale(tables, units)
     if "pulses" in tables and "wheel" in tables:
         file = tables.pop("pulses").attrs["file"]
         problems.append(f"{file}: left out, because {tables['wheel'].attrs['file']} is there too")
@@ -148,6 +146,23 @@ def check_units(units: Mapping[str, str]) -> None:
             raise ValueError(f"units has no quantity {quantity!r}; known are {', '.join(_UNITS)}")
         if unit not in _UNITS[quantity][0]:
             raise ValueError(f"units: {quantity} has no unit {unit!r}; known are {', '.join(_UNITS[quantity][0])}")
+
+
+def in_si_units(tables: dict[str, pd.DataFrame], units: Mapping[str, str]) -> None:
+    """Scale the tables from the units that were stated; raise for a quantity that none of them has."""
+    for quantity, unit in units.items():
+        factors, targets = _UNITS[quantity]
+        used = False
+        for stream in targets.keys() & tables.keys():
+            columns = [column for column in targets[stream] if column in tables[stream].columns]
+            used |= bool(columns)
+            scaled = {column: tables[stream][column] * factors[unit] for column in columns}
+            tables[stream] = tables[stream].assign(**scaled)
+        if not used:
+            places = "; ".join(f"{stream}: {', '.join(columns)}" for stream, columns in targets.items())
+            raise ValueError(
+                f"units gives {quantity!r} in {unit!r}, but the recording has none of its columns ({places})"
+            )
 
 
 def _files(folder: Path, stream: str) -> list[Path]:
@@ -267,19 +282,3 @@ def _numbers(table: pd.DataFrame, column: str) -> pd.Series:
             "write a plain number with a point, or leave the cell empty"
         )
     return numbers.astype(float)
-
-
-def _scale(tables: dict[str, pd.DataFrame], units: Mapping[str, str]) -> None:
-    for quantity, unit in units.items():
-        factors, targets = _UNITS[quantity]
-        used = False
-        for stream in targets.keys() & tables.keys():
-            columns = [column for column in targets[stream] if column in tables[stream].columns]
-            used |= bool(columns)
-            scaled = {column: tables[stream][column] * factors[unit] for column in columns}
-            tables[stream] = tables[stream].assign(**scaled)
-        if not used:
-            places = "; ".join(f"{stream}: {', '.join(columns)}" for stream, columns in targets.items())
-            raise ValueError(
-                f"units gives {quantity!r} in {unit!r}, but the recording has none of its columns ({places})"
-            )

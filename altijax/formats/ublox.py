@@ -1,15 +1,13 @@
-"""u-blox receivers' UBX logs, as tables in SI units and sensor axes.
+"""u-blox receivers' UBX logs, as tables in SI units and sensor axes."""
 
-Time starts at zero at the first IMU sample. The second result is what a recording.toml would say.
-"""
-
+import re
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
-from altijax.formats.logs import Log, from_first_imu_sample, import_extra, imu_table, stream_table
 from altijax.formats.stream_checks import RecordingError
+from altijax.formats.tables import Log, first_bytes, from_first_imu_sample, import_extra, imu_table, stream_table
 
 _PVT, _MEAS, _RAW = 0x0107, 0x1002, 0x1003
 _WEEK = 604_800_000
@@ -26,7 +24,12 @@ _SCALE = {
 """Types of measurement in ESF-MEAS and ESF-RAW, and SI units (degC) in one count of each."""
 
 
-def read_ubx(path: Path, problems: list[str], notes: list[str]) -> Log:
+def reads(path: Path) -> bool:
+    """Whether a path is a UBX log, by a frame among its first bytes, or says so by its name."""
+    return path.is_file() and (path.suffix.lower() == ".ubx" or _has_frame(first_bytes(path)))
+
+
+def read(path: Path, problems: list[str], notes: list[str]) -> Log:
     """Streams of a u-blox UBX log: ESF-RAW or else ESF-MEAS, and NAV-PVT. Without an ESF message there is no IMU."""
     pyubx2 = import_extra("pyubx2", path)
     errors: list[Exception] = []
@@ -64,6 +67,17 @@ def read_ubx(path: Path, problems: list[str], notes: list[str]) -> Log:
     if "imu" not in tables:
         problems.append(f"{path.name}: there is no IMU in it (no accelerometer in ESF-RAW or ESF-MEAS)")
     return from_first_imu_sample(tables), {"name": path.stem, "description": "u-blox log", "axes": "FLU"}
+
+
+def _has_frame(content: bytes) -> bool:
+    """Whether a UBX frame with the right check sum is among the bytes; its two bytes of sync are in any large file."""
+    for sync in re.finditer(b"\xb5\x62", content):
+        length = int.from_bytes(content[sync.end() + 2 : sync.end() + 4], "little")
+        end = sync.end() + 4 + length
+        summed = np.frombuffer(content[sync.end() : end], np.uint8).astype(np.int64)
+        if content[end : end + 2] == bytes([summed.sum() & 0xFF, summed.cumsum().sum() & 0xFF]):
+            return True
+    return False
 
 
 def _measurements(identity: str, payload: bytes) -> list[tuple[int, int, int]]:

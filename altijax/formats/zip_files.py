@@ -1,0 +1,67 @@
+"""Zip files, unpacked into a folder that lasts as long as it is read."""
+
+import shutil
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path, PurePosixPath
+
+from altijax.formats.stream_checks import RecordingError
+
+MOST_MEMBERS = 10_000
+"""Files in one zip: ten times the longest comma2k19 drive or phone export; more is not a recording."""
+
+MOST_BYTES = 10_000_000_000
+"""Bytes unpacked: a day of ten sensors at 100 Hz as text; more than that would fill disks unasked."""
+
+
+@contextmanager
+def unpacked(path: Path) -> Iterator[Path]:
+    """A folder with what a zip holds, the innermost where folders hold nothing but one folder; other paths as they are.
+
+    Links and other special members become plain files, and all of them lie below that folder.
+    """
+    if not (path.is_file() and zipfile.is_zipfile(path)):
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="altijax-") as folder:
+        place = Path(folder) / path.stem
+        place.mkdir()
+        try:
+            with zipfile.ZipFile(path) as archive:
+                _unpack(archive, path, place)
+        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, zlib.error) as error:
+            raise RecordingError(
+                f"{path.name}: it cannot be unpacked ({error}); copy it again from its source, or unpack it yourself "
+                "and give the folder"
+            ) from error
+        while len(found := list(place.iterdir())) == 1 and found[0].is_dir():
+            place = found[0]
+        yield place
+
+
+def _unpack(archive: zipfile.ZipFile, path: Path, place: Path) -> None:
+    members = [member for member in archive.infolist() if not member.is_dir()]
+    size = sum(member.file_size for member in members)
+    if len(members) > MOST_MEMBERS or size > MOST_BYTES:
+        raise RecordingError(
+            f"{path.name}: it holds {len(members)} files of {size / 1e9:.3g} GB unpacked, more than the "
+            f"{MOST_MEMBERS} files or {MOST_BYTES / 1e9:g} GB that are unpacked unasked; unpack what belongs to the "
+            "recording yourself and give the folder"
+        )
+    for member in members:
+        name = PurePosixPath(member.filename)
+        # What macOS adds beside each file is none of the recording.
+        if name.parts[0] == "__MACOSX" or name.name == ".DS_Store":
+            continue
+        target = place.joinpath(*name.parts)
+        if name.is_absolute() or ".." in name.parts or "\\" in member.filename or ":" in member.filename:
+            raise RecordingError(
+                f"{path.name}: its member {member.filename!r} points outside of it; such a zip is not unpacked"
+            )
+        target.parent.mkdir(parents=True, exist_ok=True)
+        # A member ends at the size that was added up above, whatever its content claims.
+        with archive.open(member) as source, target.open("wb") as copy:
+            shutil.copyfileobj(source, copy)
