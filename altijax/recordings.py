@@ -5,11 +5,14 @@ import math
 import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 
+from altijax.formats.mixed_tables import read_mixed
+from altijax.formats.quantities import QUANTITIES, WHEELS, check_units, in_si_units
 from altijax.formats.registry import described, format_of
 from altijax.formats.stream_checks import (
     RecordingError,
@@ -25,14 +28,9 @@ from altijax.formats.stream_checks import (
     check_together,
     clean_rows,
 )
-from altijax.formats.tidy_folder import (
-    QUANTITIES,
-    WHEELS,
-    check_units,
-    in_si_units,
-    wheel_from_pulses,
-)
-from altijax.formats.zip_files import unpacked
+from altijax.formats.tables import at_accelerometer_times
+from altijax.formats.tidy_folder import wheel_from_pulses
+from altijax.formats.zip_files import only_file, unpacked
 
 _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
 _STREAMS = ("imu", "wheel", "gnss", "reference")
@@ -123,8 +121,17 @@ class Recording:
         )
 
 
-def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[str, str] | None = None) -> Recording:
-    """Read a recording: a tidy folder, a comma2k19 segment, a PX4 ULog (.ulg) or a u-blox log (.ubx).
+def read_recording(
+    path: str | Path,
+    *,
+    axes: str | None = None,
+    units: Mapping[str, str] | None = None,
+    columns: Mapping[str, str] | None = None,
+) -> Recording:
+    """Read a recording: a tidy folder, a log of a known format, or by `columns` any table of text.
+
+    Known by their content, as a file, a folder or a zip of it: comma2k19 segments, PX4 ULog, u-blox UBX, and whatever
+    `register_format` added. Excel files are read like text.
 
     A tidy folder holds ``recording.toml`` and one CSV file (``.csv``, ``.csv.gz``, or ``.parquet``) a stream:
 
@@ -150,10 +157,17 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
     axes : str, optional
         Where the sensor's x, y and z point: F or B, L or R, U or D; overrides what the recording says.
     units : mapping of str to str, optional
-        Units of a tidy folder where they are not those above, by quantity: ``time`` (s, ms, us, ns; all files),
-        ``accelerometer`` (m/s^2, g, mg, gal), ``gyro`` (rad/s, deg/s), ``speed`` (m/s, km/h, mph, kn; wheel.csv),
-        ``gnss_speed`` (the same; velocities and their deviations in gnss.csv), ``course`` (deg, rad; gnss.csv),
-        ``attitude`` (rad, deg; reference.csv). A unit that is stated is not doubted: its check is left out.
+        Units of a tidy folder or a table where they are not those above, by quantity: ``time`` (s, ms, us, ns; all
+        files), ``accelerometer`` (m/s^2, g, mg, gal; -m/s^2 and -g with the sign of iOS), ``gyro`` (rad/s, deg/s),
+        ``speed`` (m/s, km/h, mph, kn; wheel.csv), ``gnss_speed`` (the same; velocities and their deviations in
+        gnss.csv), ``course`` (deg, rad; gnss.csv), ``height`` (m, ft), ``attitude`` (rad, deg; reference.csv). A unit
+        that is stated is not doubted: its check is left out, and what the table says of it does not count.
+    columns : mapping of str to str, optional
+        For one table of text in which several sensors stand, however its columns are called: the header of each of
+        our columns, ``{"t": "Time", "ax": "Acc X [g]", "speed": "v (km/h)"}``. Where a name could mean several streams
+        it is the wheel's or the receiver's, "gnss.speed" and "reference.alt" say otherwise. Units are taken from the
+        headers or a line of units below them; separators, decimal commas, clock times and lines above the header are
+        found. Each stream has the rows in which it has values.
 
     Returns
     -------
@@ -167,7 +181,7 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
     FileNotFoundError
         If there is nothing at `path`.
     ValueError
-        If `axes` or `units` is not valid.
+        If `axes`, `units` or `columns` is not valid.
     """
     path, units = Path(path), dict(units or {})
     check_units(units)
@@ -176,13 +190,18 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
     problems: list[str] = []
     notes: list[str] = []
     with unpacked(path) as place:
-        form, place = format_of(place)
-        if form.fixes_units and units:
+        if columns is None:
+            form, place = format_of(place)
+            fixes_units, read = form.fixes_units, form.read
+        else:
+            place, fixes_units = only_file(place), False
+            read = partial(read_mixed, columns, units)
+        if fixes_units and units:
             raise ValueError(f"units is for a tidy folder; the format of {path} fixes its units")
-        tables, sheet = form.read(place, problems, notes)
+        tables, sheet = read(place, problems, notes)
     tables = described(tables, place, problems)
     in_si_units(tables, units)
-    stated: Collection[str] = QUANTITIES if form.fixes_units else units.keys()
+    stated: Collection[str] = QUANTITIES if fixes_units else units.keys()
     if axes is None:
         axes = sheet.get("axes", "FLU")
         try:
@@ -194,7 +213,7 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
         table, imu = tables.get(stream), streams.get("imu")
         if stream == "wheel" and "pulses" in tables and imu is not None:
             table = wheel_from_pulses(tables["pulses"], sheet.get("wheel", {}), imu, problems)
-        streams[stream] = None if table is None else _stream(stream, table, stated, axes, problems)
+        streams[stream] = None if table is None else _stream(stream, table, stated, axes, problems, notes)
     check_together(streams, stated, problems)
     for problem in problems:
         warnings.warn(problem, RecordingWarning, stacklevel=2)
@@ -266,7 +285,7 @@ def _formatted(recording: Recording) -> pd.DataFrame:
 
 
 def _stream(
-    stream: str, table: pd.DataFrame, stated: Collection[str], axes: str, problems: list[str]
+    stream: str, table: pd.DataFrame, stated: Collection[str], axes: str, problems: list[str], notes: list[str]
 ) -> pd.DataFrame | None:
     """One stream in its final form, or None where nothing usable is left."""
     file = table.attrs["file"]
@@ -275,8 +294,10 @@ def _stream(
         wanted = ", or ".join(" and ".join(choice) for choice in _NEEDED[stream])
         reason = f"{file}: needs the columns {wanted} besides t and has {', '.join(table.columns)}; name them so"
     else:
-        prepare = {"imu": _with_whole_gyro, "gnss": _with_one_velocity}.get(stream)
-        table = prepare(table, problems) if prepare else table
+        if stream == "imu":
+            table = at_accelerometer_times(_with_whole_gyro(table, problems), problems, notes)
+        elif stream == "gnss":
+            table = _with_one_velocity(table, problems)
         table = clean_rows(table, set(table.columns) - _OPTIONAL[stream], problems)
         if len(table) < 2:
             reason = f"{file}: has {len(table)} usable row(s) and needs 2; record it again"

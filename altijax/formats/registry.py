@@ -10,10 +10,11 @@ from pathlib import Path
 
 import pandas as pd
 
-from altijax.formats import comma2k19, tidy_folder, ublox, ulog
+from altijax.formats import comma2k19, mixed_tables, tidy_folder, ublox, ulog
+from altijax.formats.quantities import COLUMNS
 from altijax.formats.stream_checks import RecordingError
 from altijax.formats.tables import Log
-from altijax.formats.tidy_folder import COLUMNS
+from altijax.formats.text_tables import table_names
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ FORMATS = [
         tidy_folder.read,
         fixes_units=False,
     ),
+    Format("a text table with columns t, ax, ay, az (.csv)", mixed_tables.reads, mixed_tables.read, fixes_units=False),
     Format("a comma2k19 segment (a folder with processed_log)", comma2k19.reads, comma2k19.read),
     Format("a PX4 ULog (.ulg)", ulog.reads, ulog.read),
     Format("a u-blox log (.ubx)", ublox.reads, ublox.read),
@@ -106,7 +108,23 @@ def format_of(path: Path) -> tuple[Format, Path]:
                 return known, place
     found = "a file" if path.is_file() else ", ".join(file.name for file in inside) or "an empty folder"
     raise RecordingError(
-        f"{path} is not a recording: expected {', '.join(known.name for known in FORMATS)}; found {found}"
+        f"{path} is not a recording: expected {', '.join(known.name for known in FORMATS)}; found {found}{_told(path)}"
+    )
+
+
+def _told(path: Path) -> str:
+    """What helps further with a file that no format reads: its columns, where it is a table."""
+    if not path.is_file():
+        return ""
+    names = table_names(path)
+    if names:
+        return (
+            f" with the columns {', '.join(map(repr, names))}; say what they are: read_recording(path, "
+            "columns={'t': ..., 'ax': ..., 'ay': ..., 'az': ...})"
+        )
+    return (
+        "; a table of text, in whatever columns, is read with columns={'t': ..., 'ax': ...}, and a format of your own "
+        "once register_format knows it"
     )
 
 

@@ -81,6 +81,8 @@ def clean_rows(table: pd.DataFrame, needed: Collection[str], problems: list[str]
             else:
                 table = table.assign(**{column: np.where(bad, np.nan, values)})
     table = table[keep]
+    if table.empty:
+        return table
     t = table["t"].to_numpy(float)
     backwards = np.flatnonzero(np.diff(t) < 0)
     if backwards.size:

@@ -42,6 +42,31 @@ def imu_table(
     return stream_table(t, np.concatenate([f, w], -1), ACCELEROMETER + GYRO, file)
 
 
+def at_accelerometer_times(table: pd.DataFrame, problems: list[str], notes: list[str]) -> pd.DataFrame:
+    """An IMU's table in which accelerometer and gyro hold different rows, with the gyro at the accelerometer's times.
+
+    So they stand after an outer merge of two files. A table that has both in half of the accelerometer's rows is
+    returned as it is.
+    """
+    if not set(GYRO) <= set(table.columns):
+        return table
+    moving, turning = (table[triad].notna().all(axis=1).to_numpy() for triad in (ACCELEROMETER, GYRO))
+    if 2 * (moving & turning).sum() >= moving.sum() or turning.sum() < 2:
+        return table
+    table, file = table.sort_values("t", kind="stable"), table.attrs["file"]
+    moving, turning = (table[triad].notna().all(axis=1).to_numpy() for triad in (ACCELEROMETER, GYRO))
+    series = [
+        (table.loc[rows, "t"].to_numpy(), table.loc[rows, triad].to_numpy())
+        for rows, triad in ((moving, ACCELEROMETER), (turning, GYRO))
+    ]
+    notes.append(f"{file}: accelerometer and gyro stand in different rows, as after an outer merge")
+    merged = imu_table(series[0], series[1], file, problems, notes)
+    if "temperature" in table.columns and table["temperature"].notna().any():
+        known = table[["t", "temperature"]].dropna()
+        merged["temperature"] = np.interp(merged["t"], known["t"], known["temperature"])
+    return merged
+
+
 def stream_table(t: np.ndarray, values: np.ndarray, columns: Sequence[str], file: str) -> pd.DataFrame:
     """Table of a stream that counts its rows from 1."""
     table = pd.DataFrame(values, columns=list(columns), index=pd.RangeIndex(1, len(t) + 1, name="row"))

@@ -14,20 +14,12 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.constants import GAL, STANDARD_GRAVITY
-from altijax.formats.stream_checks import SPEED_UNITS, RecordingError, check_overlap, clean_rows
+from altijax.formats.quantities import COLUMNS, WHEELS
+from altijax.formats.stream_checks import RecordingError, check_overlap, clean_rows
 from altijax.formats.tables import Log
 from altijax.padding import bucket, padded
 from altijax.wheels import speed_from_pulses, standstill_from_pulses
 
-WHEELS = ("left", "right", "front_left", "front_right", "rear_left", "rear_right")
-COLUMNS = {
-    "imu": ("t", "ax", "ay", "az", "gx", "gy", "gz", "temperature"),
-    "wheel": ("t", "speed", *WHEELS),
-    "pulses": ("t", "wheel"),
-    "gnss": ("t", "v_e", "v_n", "v_u", "speed", "course", "climb", "lat", "lon", "alt", "sd_e", "sd_n", "sd_u"),
-    "reference": ("t", "roll", "pitch", "heading", "v_e", "v_n", "v_u", "lat", "lon", "alt"),
-}
 _ENDINGS = (".csv", ".csv.gz", ".parquet")
 # Sizes that pulses and times of one wheel are filled up to: a town drive of ten minutes has some 10,000 pulses.
 _PULSES, _SPEEDS = 16384, 16384
@@ -37,21 +29,6 @@ _SHEET: dict[str, dict[str, Any]] = {
     "site": {"latitude": float, "height": float},
     "source": {"origin": str, "licence": str},
 }
-
-_UNITS: dict[str, tuple[dict[str, float], dict[str, tuple[str, ...]]]] = {
-    "time": ({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}, {stream: ("t",) for stream in COLUMNS}),
-    "accelerometer": (
-        {"m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY, "gal": GAL},
-        {"imu": ("ax", "ay", "az")},
-    ),
-    "gyro": ({"rad/s": 1.0, "deg/s": np.pi / 180}, {"imu": ("gx", "gy", "gz")}),
-    "speed": (SPEED_UNITS, {"wheel": ("speed", *WHEELS)}),
-    "gnss_speed": (SPEED_UNITS, {"gnss": ("v_e", "v_n", "v_u", "speed", "climb", "sd_e", "sd_n", "sd_u")}),
-    "course": ({"deg": 1.0, "rad": 180 / np.pi}, {"gnss": ("course",)}),
-    "attitude": ({"rad": 1.0, "deg": np.pi / 180}, {"reference": ("roll", "pitch", "heading")}),
-}
-QUANTITIES = tuple(_UNITS)
-"""Quantities that may be stored in other units."""
 
 
 def reads(path: Path) -> bool:
@@ -137,32 +114,6 @@ def wheel_from_pulses(
 def _pulse_speeds(t_pulses: jax.Array, t: jax.Array, distance: float) -> jax.Array:
     speed, _ = speed_from_pulses(t_pulses, t, distance)
     return jnp.where(standstill_from_pulses(t_pulses, t, 1.0), 0, speed)
-
-
-def check_units(units: Mapping[str, str]) -> None:
-    """Raise for a quantity or a unit that is not known."""
-    for quantity, unit in units.items():
-        if quantity not in _UNITS:
-            raise ValueError(f"units has no quantity {quantity!r}; known are {', '.join(_UNITS)}")
-        if unit not in _UNITS[quantity][0]:
-            raise ValueError(f"units: {quantity} has no unit {unit!r}; known are {', '.join(_UNITS[quantity][0])}")
-
-
-def in_si_units(tables: dict[str, pd.DataFrame], units: Mapping[str, str]) -> None:
-    """Scale the tables from the units that were stated; raise for a quantity that none of them has."""
-    for quantity, unit in units.items():
-        factors, targets = _UNITS[quantity]
-        used = False
-        for stream in targets.keys() & tables.keys():
-            columns = [column for column in targets[stream] if column in tables[stream].columns]
-            used |= bool(columns)
-            scaled = {column: tables[stream][column] * factors[unit] for column in columns}
-            tables[stream] = tables[stream].assign(**scaled)
-        if not used:
-            places = "; ".join(f"{stream}: {', '.join(columns)}" for stream, columns in targets.items())
-            raise ValueError(
-                f"units gives {quantity!r} in {unit!r}, but the recording has none of its columns ({places})"
-            )
 
 
 def _files(folder: Path, stream: str) -> list[Path]:

@@ -65,3 +65,16 @@ def _unpack(archive: zipfile.ZipFile, path: Path, place: Path) -> None:
         # A member ends at the size that was added up above, whatever its content claims.
         with archive.open(member) as source, target.open("wb") as copy:
             shutil.copyfileobj(source, copy)
+
+
+def only_file(place: Path) -> Path:
+    """The file that a path is, or the only one in the folder that it is."""
+    if not place.exists():
+        raise FileNotFoundError(f"there is no file or folder {place}")
+    files = [place] if place.is_file() else sorted(file for file in place.iterdir() if file.is_file())
+    if len(files) != 1:
+        raise ValueError(
+            f"columns is for one table; {place.name} holds {', '.join(file.name for file in files) or 'none'}: give "
+            "the path of one file"
+        )
+    return files[0]

@@ -5,7 +5,7 @@ import zipfile
 import pytest
 
 from altijax.formats import zip_files
-from altijax.formats.zip_files import unpacked
+from altijax.formats.zip_files import only_file, unpacked
 from altijax.recordings import RecordingError, read_recording
 
 IMU = "t,ax,ay,az\n0,0,0,9.8\n0.01,0,0,9.8\n0.02,0,0,9.8\n"
@@ -59,3 +59,11 @@ def test_a_damaged_zip_and_an_empty_one(tmp_path):
         read_recording(path)
     with pytest.raises(RecordingError, match="found an empty folder"):
         read_recording(zipped(tmp_path / "empty.zip", {}))
+
+
+def test_the_only_file_of_a_place(tmp_path):
+    (tmp_path / "a.csv").write_text("")
+    assert only_file(tmp_path) == only_file(tmp_path / "a.csv") == tmp_path / "a.csv"
+    (tmp_path / "b.csv").write_text("")
+    with pytest.raises(ValueError, match=r"holds a.csv, b.csv: give the path of one file"):
+        only_file(tmp_path)
