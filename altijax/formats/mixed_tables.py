@@ -9,7 +9,7 @@ import pandas as pd
 from altijax.formats.quantities import COLUMNS, QUANTITIES, factor_of, quantity_of, unit_named
 from altijax.formats.stream_checks import RecordingError
 from altijax.formats.tables import Log, from_first_imu_sample
-from altijax.formats.text_tables import Layout, layout_of, numbers, read_columns, seconds
+from altijax.formats.text_tables import Layout, layout_of, needed_layout, numbers, read_columns, seconds
 
 _STREAMS = ("imu", "wheel", "gnss", "reference")
 
@@ -24,8 +24,7 @@ def reads(path: Path) -> bool:
 
 def read(path: Path, problems: list[str], notes: list[str]) -> Log:
     """Streams of a table whose columns have our names already."""
-    layout = layout_of(path)
-    assert layout is not None
+    layout = needed_layout(path)
     known = {column for stream in _STREAMS for column in COLUMNS[stream]}
     others = [name for name in layout.names if name not in known]
     if others:
@@ -55,12 +54,18 @@ def read_mixed(
     tables, sheet
         As a reader gives them.
     """
-    layout = layout_of(path)
-    if layout is None:
-        raise RecordingError(
-            f"{path.name}: there is no table of numbers in it; columns is for a text file with one row a sample, "
-            "separated by commas, semicolons or tabs"
-        )
+    return streams_of(path, needed_layout(path), columns, stated, problems, notes)
+
+
+def streams_of(
+    path: Path,
+    layout: Layout,
+    columns: Mapping[str, str],
+    stated: Collection[str],
+    problems: list[str],
+    notes: list[str],
+) -> Log:
+    """Streams of the table whose layout is known; see `read_mixed`."""
     targets = _by_stream(columns)
     missing = [source for source in columns.values() if source not in layout.names]
     if missing:

@@ -126,6 +126,12 @@ def check_accelerometer_unit(imu: pd.DataFrame) -> Iterator[str]:
         yield f"{seen}; check the unit, and that gravity was not taken out (specific force is wanted)"
 
 
+_IOS = (
+    ", if the sensor hangs that way; if it is an iPhone's, it has all three signs reversed, which no axes code mends: "
+    "read with units={'accelerometer': '-m/s^2'} ('-g' if it is in g)"
+)
+
+
 def check_gravity(imu: pd.DataFrame, axes: str) -> Iterator[str]:
     """Yield a sentence with a better axes code if gravity does not point up after `axes` was applied."""
     mean = imu[["ax", "ay", "az"]].to_numpy().mean(axis=0)
@@ -140,6 +146,7 @@ def check_gravity(imu: pd.DataFrame, axes: str) -> Iterator[str]:
     yield (
         f"{imu.attrs['file']}, columns ax, ay, az: with axes={axes!r} the mean is ({seen}) m/s^2 forward, left, up, "
         f"so gravity is not up; axes={best!r} would put it there"
+        f"{_IOS if -mean[2] == np.abs(mean).max() else ''}"
     )
 
 

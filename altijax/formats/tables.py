@@ -67,6 +67,14 @@ def at_accelerometer_times(table: pd.DataFrame, problems: list[str], notes: list
     return merged
 
 
+def with_known_velocity(table: pd.DataFrame, notes: list[str]) -> pd.DataFrame:
+    """The rows of a receiver that have speed and course; where it rests a course does not matter, and often is none."""
+    known = table["speed"].notna() & (table["course"].notna() | (table["speed"] == 0))
+    if not known.all():
+        notes.append(f"{table.attrs['file']}: {(~known).sum()} rows without speed or course dropped")
+    return table[known]
+
+
 def stream_table(t: np.ndarray, values: np.ndarray, columns: Sequence[str], file: str) -> pd.DataFrame:
     """Table of a stream that counts its rows from 1."""
     table = pd.DataFrame(values, columns=list(columns), index=pd.RangeIndex(1, len(t) + 1, name="row"))

@@ -71,6 +71,17 @@ def layout_of(path: Path) -> Layout | None:
     return None
 
 
+def needed_layout(path: Path) -> Layout:
+    """The layout of the table in a text file; raises where there is none."""
+    layout = layout_of(path)
+    if layout is None:
+        raise RecordingError(
+            f"{path.name}: there is no table of numbers in it, one row a sample, separated by commas, semicolons or "
+            "tabs; look into it with a text editor, and export it again"
+        )
+    return layout
+
+
 def table_names(path: Path) -> tuple[str, ...]:
     """Names of the columns of a text file's table, also where it has no rows; empty for another file."""
     layout = layout_of(path)
@@ -225,10 +236,8 @@ def _layout(lines: list[str], rows: list[list[str]], first: int, separator: str,
     units, sources = {}, {}
     for k, name in enumerate(names):
         told = [row[k] for row in below if row[k]]
-        bracketed = re.search(r"[\[(]\s*([^\[\]()]*?)\s*[\])]\s*(?:\(\d+\))?\s*$", name)
-        unit = next((text for text in told if unit_named(text)), None)
-        if unit is None and bracketed and not bracketed[1].isdigit():
-            unit = bracketed[1]
+        bracketed = [text for text in re.findall(r"[\[(]\s*([^\[\]()]*?)\s*[\])]", name) if not text.isdigit()]
+        unit = next((text for text in [*told, *bracketed] if unit_named(text)), bracketed[-1] if bracketed else None)
         if unit is not None:
             units[name] = unit
         sources[name] = " ".join(text for text in told if text != unit)
