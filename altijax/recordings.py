@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 
+from altijax.formats.containers import only_file, unpacked
 from altijax.formats.mixed_tables import read_mixed
 from altijax.formats.quantities import QUANTITIES, WHEELS, check_units, in_si_units
 from altijax.formats.registry import described, format_of
@@ -30,7 +31,6 @@ from altijax.formats.stream_checks import (
 )
 from altijax.formats.tables import at_accelerometer_times
 from altijax.formats.tidy_folder import wheel_from_pulses
-from altijax.formats.zip_files import only_file, unpacked
 
 _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
 _STREAMS = ("imu", "wheel", "gnss", "reference")

@@ -1,5 +1,7 @@
-"""Zip files, unpacked into a folder that lasts as long as it is read."""
+"""Zips and workbooks, unpacked into a folder that lasts as long as it is read."""
 
+import csv
+import re
 import shutil
 import tempfile
 import zipfile
@@ -9,6 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path, PurePosixPath
 
 from altijax.formats.stream_checks import RecordingError
+from altijax.formats.tables import first_bytes, import_extra
 
 MOST_MEMBERS = 10_000
 """Files in one zip: ten times the longest comma2k19 drive or phone export; more is not a recording."""
@@ -17,32 +20,75 @@ MOST_BYTES = 10_000_000_000
 """Bytes unpacked: a day of ten sensors at 100 Hz as text; more than that would fill disks unasked."""
 
 
+_XLS = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1"
+"""First bytes of Excel's older files."""
+
+
 @contextmanager
 def unpacked(path: Path) -> Iterator[Path]:
-    """A folder with what a zip holds, the innermost where folders hold nothing but one folder; other paths as they are.
+    """A folder with what a zip or workbook holds, the innermost where folders hold one folder; other paths as they are.
 
-    Links and other special members become plain files, and all of them lie below that folder.
+    A workbook gives a CSV file a sheet. Links and other special members of a zip become plain files, and all of them
+    lie below that folder.
     """
-    if not (path.is_file() and zipfile.is_zipfile(path)):
+    kind = _kind(path)
+    if kind is None:
         yield path
         return
     with tempfile.TemporaryDirectory(prefix="altijax-") as folder:
         place = Path(folder) / path.stem
         place.mkdir()
-        try:
-            with zipfile.ZipFile(path) as archive:
-                _unpack(archive, path, place)
-        except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, zlib.error) as error:
-            raise RecordingError(
-                f"{path.name}: it cannot be unpacked ({error}); copy it again from its source, or unpack it yourself "
-                "and give the folder"
-            ) from error
+        if kind == "workbook":
+            _write_sheets(path, place)
+        else:
+            _unpack(path, place)
         while len(found := list(place.iterdir())) == 1 and found[0].is_dir():
             place = found[0]
         yield place
 
 
-def _unpack(archive: zipfile.ZipFile, path: Path, place: Path) -> None:
+def _kind(path: Path) -> str | None:
+    if not path.is_file():
+        return None
+    if first_bytes(path, 8) == _XLS:
+        return "workbook"
+    if not zipfile.is_zipfile(path):
+        return None
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return "workbook" if "xl/workbook.xml" in archive.namelist() else "zip"
+    except zipfile.BadZipFile:
+        return "zip"
+
+
+def _write_sheets(path: Path, place: Path) -> None:
+    calamine = import_extra("python_calamine", path)
+    try:
+        book = calamine.CalamineWorkbook.from_path(path)
+        for name in book.sheet_names:
+            rows = book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+            with (place / f"{re.sub(r'[^0-9A-Za-z _-]', '_', name)}.csv").open(
+                "w", newline="", encoding="utf-8"
+            ) as file:
+                csv.writer(file).writerows(rows)
+    except calamine.CalamineError as error:
+        raise RecordingError(
+            f"{path.name}: not a workbook that can be read ({error}); save its sheet as CSV and give that"
+        ) from error
+
+
+def _unpack(path: Path, place: Path) -> None:
+    try:
+        with zipfile.ZipFile(path) as archive:
+            _extract(archive, path, place)
+    except (zipfile.BadZipFile, NotImplementedError, RuntimeError, OSError, zlib.error) as error:
+        raise RecordingError(
+            f"{path.name}: it cannot be unpacked ({error}); copy it again from its source, or unpack it yourself "
+            "and give the folder"
+        ) from error
+
+
+def _extract(archive: zipfile.ZipFile, path: Path, place: Path) -> None:
     members = [member for member in archive.infolist() if not member.is_dir()]
     size = sum(member.file_size for member in members)
     if len(members) > MOST_MEMBERS or size > MOST_BYTES:
