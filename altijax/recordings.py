@@ -130,8 +130,9 @@ def read_recording(
 ) -> Recording:
     """Read a recording: a tidy folder, a log of a known format, or by `columns` any table of text.
 
-    Known by their content, as a file, a folder or a zip of it: comma2k19 segments, PX4 ULog, u-blox UBX, and whatever
-    `register_format` added. Excel files are read like text.
+    Known by their content, as a file, a folder or a zip of it: exports of the phone apps Sensor Logger, phyphox and
+    AndroSensor; NMEA, u-blox UBX, RTKLIB solutions (.pos); Racelogic .vbo, RaceChrono and AiM CSV; PX4 ULog; comma2k19
+    segments; and whatever `register_format` added. Excel workbooks are read like a folder of tables.
 
     A tidy folder holds ``recording.toml`` and one CSV file (``.csv``, ``.csv.gz``, or ``.parquet``) a stream:
 

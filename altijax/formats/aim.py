@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from altijax.formats.mixed_tables import streams_of
+from altijax.formats.mixed_tables import known_streams
 from altijax.formats.tables import Log, first_bytes
 from altijax.formats.text_tables import needed_layout
 
@@ -39,5 +39,5 @@ def read(path: Path, problems: list[str], notes: list[str]) -> Log:
         )
         columns = {ours: theirs for ours, theirs in columns.items() if ours == "t" or ours.startswith("gnss.")}
     notes.append(f"{path.name}: Race Studio interpolates the receiver's values to the rate of the export")
-    tables, sheet = streams_of(path, layout, columns, (), problems, notes)
+    tables, sheet = known_streams(path, layout, columns, problems, notes)
     return tables, sheet | {"description": "AiM Race Studio export"}

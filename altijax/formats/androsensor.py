@@ -4,7 +4,7 @@ import dataclasses
 import re
 from pathlib import Path
 
-from altijax.formats.mixed_tables import streams_of
+from altijax.formats.mixed_tables import known_streams
 from altijax.formats.phones import AXES
 from altijax.formats.tables import Log
 from altijax.formats.text_tables import needed_layout, table_names
@@ -35,7 +35,7 @@ def read(path: Path, problems: list[str], notes: list[str]) -> Log:
     columns = _mapping(table_names(path))
     layout = needed_layout(path)
     layout = dataclasses.replace(layout, units=layout.units | {columns["t"]: "ms"})
-    tables, sheet = streams_of(path, layout, columns, (), problems, notes)
+    tables, sheet = known_streams(path, layout, columns, problems, notes)
     if {"lat", "lon"} <= set(tables.get("gnss", ())):
         nowhere = (tables["gnss"][["lat", "lon"]] == 0).all(axis=1)
         if nowhere.any():

@@ -86,6 +86,16 @@ def streams_of(
     return from_first_imu_sample(tables), {"name": path.stem, "description": f"table {path.name}"}
 
 
+def known_streams(path: Path, layout: Layout, columns: Mapping[str, str], problems: list[str], notes: list[str]) -> Log:
+    """Streams of a format's table, by those of its columns that were found, in the units that it names."""
+    if "t" not in columns or len(columns) < 2:
+        raise RecordingError(
+            f"{path.name}: has no time or nothing beside it that is known; its columns are "
+            f"{', '.join(map(repr, layout.names))}: export it again, or say what they are with columns={{...}}"
+        )
+    return streams_of(path, layout, columns, (), problems, notes)
+
+
 def _by_stream(columns: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """The mapping of each stream's columns, with its times; raises for names that are none of ours."""
     targets: dict[str, dict[str, str]] = {}
@@ -131,7 +141,8 @@ def _stream(
         if column == "t":
             found["t"] = seconds(table, sources["t"], factor, problems)
         else:
-            found[column] = numbers(table, sources[column], problems) * factor
+            with np.errstate(over="ignore"):
+                found[column] = numbers(table, sources[column], problems) * factor
     frame = pd.DataFrame(found, index=table.index)
     frame = frame[frame.drop(columns="t").notna().any(axis=1)]
     frame.attrs["file"] = f"{table.attrs['file']}, {stream}"

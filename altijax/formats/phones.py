@@ -43,10 +43,9 @@ def series(
         return None
     table = read_columns(path, layout, columns.values())
     t = seconds(table, columns["t"], factors.get("t", 1.0), problems)
-    values = np.stack(
-        [numbers(table, source, problems) * factors.get(name, 1.0) for name, source in columns.items() if name != "t"],
-        -1,
-    )
+    found = [numbers(table, source, problems) for name, source in columns.items() if name != "t"]
+    with np.errstate(over="ignore"):
+        values = np.stack(found, -1) * [factors.get(name, 1.0) for name in columns if name != "t"]
     usable = np.isfinite(t) & np.isfinite(values).any(1)
     if usable.sum() < len(t):
         notes.append(f"{path.name}: {len(t) - usable.sum()} rows without time or value dropped")

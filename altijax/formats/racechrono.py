@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from altijax.formats.mixed_tables import streams_of
+from altijax.formats.mixed_tables import known_streams
 from altijax.formats.tables import Log, first_bytes
 from altijax.formats.text_tables import Layout, needed_layout
 
@@ -39,7 +39,7 @@ def read(path: Path, problems: list[str], notes: list[str]) -> Log:
         problems.append(
             f"{path.name}: there is no accelerometer in it; let RaceChrono use the phone's and export again"
         )
-    tables, sheet = streams_of(path, layout, columns, (), problems, notes)
+    tables, sheet = known_streams(path, layout, columns, problems, notes)
     return tables, sheet | {"description": "RaceChrono export"}
 
 

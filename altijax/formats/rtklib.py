@@ -25,6 +25,7 @@ def read(path: Path, problems: list[str], notes: list[str]) -> Log:
     """Streams of a solution: gnss, or without velocities its positions as the reference."""
     header = _header(path)
     names = re.sub(r"\([^)]*\)", "", header[2]).replace(",", " ").split() if header else []
+    _check_names(path, names)
     table = _rows(path, names, problems)
     if not len(table):
         raise RecordingError(
@@ -88,6 +89,26 @@ def _rows(path: Path, names: list[str], problems: list[str]) -> pd.DataFrame:
     if damaged:
         problems.append(f"{path.name}: {damaged} lines are not whole epochs and were left out")
     return pd.DataFrame(whole, columns=["t", *names])
+
+
+_SETS = (
+    ("latitude", "longitude", "height"),
+    ("x-ecef", "y-ecef", "z-ecef"),
+    ("e-baseline", "n-baseline", "u-baseline"),
+    ("vn", "ve", "vu"),
+    ("vx", "vy", "vz"),
+)
+
+
+def _check_names(path: Path, names: list[str]) -> None:
+    """Raise where the line that names the columns has only part of what belongs together."""
+    for together in _SETS:
+        missing = [name for name in together if name not in names]
+        if 0 < len(missing) < 3:
+            raise RecordingError(
+                f"{path.name}: its line of names has {', '.join(names)} but no {', '.join(missing)}; copy it again from "
+                "its source"
+            )
 
 
 def _position(table: pd.DataFrame) -> dict[str, np.ndarray]:

@@ -68,7 +68,7 @@ def clean_rows(table: pd.DataFrame, needed: Collection[str], problems: list[str]
     keep = np.ones(len(table), bool)
     for column in table.columns:
         values = table[column].to_numpy(float)
-        bad = ~np.isfinite(values)
+        bad = ~(np.abs(values) < _LARGEST)
         # An optional column that is empty throughout was never recorded.
         if bad.any() and (column in needed or not bad.all()):
             fate = "dropped" if column in needed else "kept as missing"
@@ -125,6 +125,9 @@ def check_accelerometer_unit(imu: pd.DataFrame) -> Iterator[str]:
     if not 5 < size < 20:
         yield f"{seen}; check the unit, and that gravity was not taken out (specific force is wanted)"
 
+
+_LARGEST = 1e100
+"""No quantity reaches it, and what exceeds its square cannot be told from infinity."""
 
 _IOS = (
     ", if the sensor hangs that way; if it is an iPhone's, it has all three signs reversed, which no axes code mends: "

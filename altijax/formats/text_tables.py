@@ -143,6 +143,12 @@ def numbers(table: pd.DataFrame, column: str, problems: list[str]) -> np.ndarray
     return found.to_numpy(float)
 
 
+def is_clock(values: pd.Series) -> bool:
+    """Whether a column is a clock's times rather than numbers, by its first value."""
+    text = values.dropna()
+    return values.dtype.kind not in "iuf" and bool(len(text)) and bool(_CLOCK.fullmatch(str(text.iloc[0]).strip()))
+
+
 def seconds(table: pd.DataFrame, column: str, factor: float, problems: list[str]) -> np.ndarray:
     """A column of times in s: numbers times `factor`, or a clock's, which may pass midnight, with or without a date."""
     values = table[column]

@@ -17,6 +17,7 @@ import pandas as pd
 from altijax.formats.quantities import COLUMNS, WHEELS
 from altijax.formats.stream_checks import RecordingError, check_overlap, clean_rows
 from altijax.formats.tables import Log
+from altijax.formats.text_tables import is_clock, layout_of, read_columns, seconds
 from altijax.padding import bucket, padded
 from altijax.wheels import speed_from_pulses, standstill_from_pulses
 
@@ -167,6 +168,8 @@ def _read_table(path: Path, stream: str, problems: list[str]) -> pd.DataFrame:
     if unknown:
         problems.append(f"{path.name}: unknown columns {', '.join(unknown)} ignored; known are {', '.join(known)}")
     table = table[[column for column in known if column in table.columns]]
+    if is_clock(table["t"]):
+        table = table.assign(t=seconds(table, "t", 1.0, problems))
     return table.assign(**{column: _numbers(table, column) for column in table.columns if column != "wheel"})
 
 
@@ -175,6 +178,9 @@ def _read_csv(path: Path) -> pd.DataFrame:
         content = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
     except (EOFError, gzip.BadGzipFile, zlib.error) as error:
         raise RecordingError(f"{path.name}: damaged or cut short ({error}); copy it again from its source") from error
+    layout = layout_of(path)
+    if layout is not None and layout.separator != "," and "t" in layout.names:
+        return read_columns(path, layout, layout.names)
     try:
         with warnings.catch_warnings():
             # Without an index column pandas only warns of a row that is longer than the header.

@@ -3,6 +3,7 @@
 Positions are in minutes of arc with West positive, speeds in km/h, times of day packed as HHMMSS.SS.
 """
 
+import csv
 import io
 import re
 from pathlib import Path
@@ -15,6 +16,9 @@ from altijax.formats.stream_checks import SPEED_UNITS, RecordingError
 from altijax.formats.tables import Log, first_bytes, from_first_imu_sample, imu_table, stream_table
 
 _DAY = 86400.0
+_LARGEST = 1e12
+"""Beyond every number that such a file can hold, packed times included."""
+
 _GNSS = {
     "speed": r"velocity",
     "course": r"heading",
@@ -88,12 +92,17 @@ def _rows(path: Path, names: list[str], lines: list[str], problems: list[str]) -
         problems.append(
             f"{path.name}: {len(lines) - len(whole)} rows under [data] have other than {len(names)} values; left out"
         )
+    if not whole:
+        return pd.DataFrame(columns=names)
     text = "\n".join(whole)
     if "," in text[:4096]:
         text = text.replace(",", ".")
-    table = pd.read_csv(io.StringIO(text), sep=r"\s+", header=None, names=list(range(len(names))))
+    table = pd.read_csv(
+        io.StringIO(text), sep=r"\s+", header=None, names=list(range(len(names))), quoting=csv.QUOTE_NONE
+    )
     table.columns = pd.Index([f"{name} ({k})" if name in names[:k] else name for k, name in enumerate(names)])
-    return table.apply(pd.to_numeric, errors="coerce")
+    numbers = table.apply(pd.to_numeric, errors="coerce")
+    return numbers.where(numbers.abs() < _LARGEST)
 
 
 def _seconds_of(packed: np.ndarray) -> np.ndarray:

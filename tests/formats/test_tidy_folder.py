@@ -77,9 +77,9 @@ def test_a_line_with_too_few_values_is_dropped_and_named(tmp_path):
         assert len(read_recording(imu(tmp_path, with_line(17, "1.5,0,0.2"))).imu) == 49
 
 
-def test_semicolons_are_recognised(tmp_path):
-    with pytest.raises(RecordingError, match=r"no column t among t;ax;ay;az; separate columns by commas"):
-        read_recording(imu(tmp_path, [row.replace(",", ";") for row in ROWS]))
+def test_semicolons_without_a_column_t(tmp_path):
+    with pytest.raises(RecordingError, match=r"no column t among s;ax;ay;az; separate columns by commas"):
+        read_recording(imu(tmp_path, [row.replace(",", ";").replace("t", "s") for row in ROWS]))
 
 
 def test_rows_all_longer_than_the_header(tmp_path):
@@ -229,3 +229,24 @@ def test_wheel_speeds_win_over_pulses(tmp_path):
     (tmp_path / "wheel.csv").write_text("t,speed\n0,3\n0.1,3\n0.2,4\n")
     with pytest.warns(RecordingWarning, match=r"pulses.csv: left out, because wheel.csv is there too"):
         assert read_recording(tmp_path).wheel["speed"].to_list() == [3, 3, 4]
+
+
+def test_semicolons_decimal_commas_and_a_clock(tmp_path):
+    lines = ["t;ax;ay;az"]
+    lines += [
+        f"23:59:{58 + 0.1 * k:06.3f};0,1;0,2;9,8" if k < 20 else f"00:00:{0.1 * k - 2:06.3f};0,1;0,2;9,8"
+        for k in range(50)
+    ]
+    imu(tmp_path, lines)
+    r = read_recording(tmp_path)
+    np.testing.assert_allclose(r.imu.index - r.imu.index[0], 0.1 * np.arange(50), atol=1e-9)
+    assert (r.imu["ax"] == 0.1).all() and (r.imu["az"] == 9.8).all()
+
+
+def test_a_stream_without_one_usable_row_does_not_stop_the_rest(tmp_path):
+    imu(tmp_path)
+    (tmp_path / "wheel.csv").write_text("t,speed\n" + "\n".join(f"{k}," for k in range(5)))
+    with pytest.warns(RecordingWarning) as seen:
+        r = read_recording(tmp_path)
+    assert r.wheel is None and len(r.imu) == 50
+    assert any("wheel.csv: has 0 usable row(s) and needs 2" in str(w.message) for w in seen)
