@@ -144,7 +144,8 @@ def _stream(
             with np.errstate(over="ignore"):
                 found[column] = numbers(table, sources[column], problems) * factor
     frame = pd.DataFrame(found, index=table.index)
-    frame = frame[frame.drop(columns="t").notna().any(axis=1)]
+    filled = frame.drop(columns="t").notna().any(axis=1)
+    frame = frame if filled.all() else frame[filled]
     frame.attrs["file"] = f"{table.attrs['file']}, {stream}"
     return without_held_rows(frame, notes) if stream == "gnss" else frame
 

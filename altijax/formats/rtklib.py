@@ -106,8 +106,8 @@ def _check_names(path: Path, names: list[str]) -> None:
         missing = [name for name in together if name not in names]
         if 0 < len(missing) < 3:
             raise RecordingError(
-                f"{path.name}: its line of names has {', '.join(names)} but no {', '.join(missing)}; copy it again from "
-                "its source"
+                f"{path.name}: its line of names has {', '.join(names)} but no {', '.join(missing)}; copy it "
+                "again from its source"
             )
 
 

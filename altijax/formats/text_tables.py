@@ -120,7 +120,8 @@ def read_columns(path: Path, layout: Layout, names: Collection[str]) -> pd.DataF
     first = layout.skipped + 1
     table.index = pd.RangeIndex(first, first + len(table), name="line")
     table.attrs["file"] = path.name
-    return table[[name for name in layout.names if name in names]].dropna(how="all")
+    chosen = table[[name for name in layout.names if name in names]]
+    return chosen if chosen.notna().any(axis=1).all() else chosen.dropna(how="all")
 
 
 def numbers(table: pd.DataFrame, column: str, problems: list[str]) -> np.ndarray:
@@ -152,8 +153,10 @@ def is_clock(values: pd.Series) -> bool:
 def seconds(table: pd.DataFrame, column: str, factor: float, problems: list[str]) -> np.ndarray:
     """A column of times in s: numbers times `factor`, or a clock's, which may pass midnight, with or without a date."""
     values = table[column]
+    if values.dtype.kind in "iuf":
+        return numbers(table, column, problems) * factor
     text = values.dropna().astype(str).str.strip()
-    if values.dtype.kind in "iuf" or text.empty or _NUMBER.fullmatch(text.iloc[0]):
+    if text.empty or _NUMBER.fullmatch(text.iloc[0]):
         return numbers(table, column, problems) * factor
     parts = text.str.extract(r"^(?:(\d+):)?(\d{1,2}):(\d{1,2}(?:[.,]\d+)?)$")
     if not parts[1].isna().any():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from altijax.recordings import RecordingWarning, read_recording
+from altijax.recordings import RecordingError, RecordingWarning, read_recording
 
 GPS = {
     "GPS Speed": ("km/h", lambda k: 36.0 + k),
@@ -61,3 +61,9 @@ def test_an_export_of_the_receiver_alone(tmp_path):
     with pytest.warns(RecordingWarning, match=r"InlineAcc, LateralAcc and VerticalAcc are not all in it"):
         r = read_recording(write(tmp_path / "a.csv", GPS | {"InlineAcc": IMU["InlineAcc"]}))
     assert r.imu is None and len(r.gnss) == 40
+
+
+def test_an_export_without_a_channel_that_is_known(tmp_path):
+    path = write(tmp_path / "a.csv", {"Water Temp": ("C", lambda k: 80.0)})
+    with pytest.raises(RecordingError, match=r"a.csv: has no time or nothing beside it that is known; .* 'Water Temp'"):
+        read_recording(path)

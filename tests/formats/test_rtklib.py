@@ -91,3 +91,9 @@ def test_damaged_lines_and_no_lines(tmp_path):
     assert len(r.reference) == 4
     with pytest.raises(RecordingError, match=r"a.pos: has no epochs"):
         read_recording(write(tmp_path / "a.pos", LLH, []))
+
+
+def test_a_damaged_line_of_names(tmp_path):
+    rows = [f"{t} {' '.join(map(str, SITE))} 1 12 {REST}" for t in epochs()]
+    with pytest.raises(RecordingError, match=r"a.pos: its line of names has .* but no height; copy it again"):
+        read_recording(write(tmp_path / "a.pos", LLH.replace("height(m)", "h(m)"), rows))

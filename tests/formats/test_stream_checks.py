@@ -8,6 +8,7 @@ from altijax.formats.stream_checks import (
     RecordingError,
     axes_to_matrix,
     check_accelerometer_unit,
+    check_gravity,
     check_gyro_unit,
     check_overlap,
     check_time_unit,
@@ -140,3 +141,12 @@ def test_turns_say_nothing_on_a_straight_road_or_at_rest():
     resting = indexed(t_gnss, "gnss.csv", v_e=np.sin(t_gnss), v_n=np.cos(t_gnss))
     for gnss in (straight, resting):
         assert list(check_turns(indexed(t, "imu.csv", gz=60 * gz), gnss, False)) == []
+
+
+def test_signs_of_ios_are_named_where_gravity_points_the_other_way():
+    imu = pd.DataFrame({"ax": 0.1, "ay": 0.2, "az": [-9.8] * 5})
+    imu.attrs["file"] = "imu.csv"
+    (said,) = check_gravity(imu, "FLU")
+    assert "axes='FRD' would put it there" in said and "units={'accelerometer': '-m/s^2'}" in said
+    (sideways,) = check_gravity(imu.rename(columns={"ax": "az", "az": "ax"}), "FLU")
+    assert "iPhone" not in sideways

@@ -250,3 +250,9 @@ def test_a_stream_without_one_usable_row_does_not_stop_the_rest(tmp_path):
         r = read_recording(tmp_path)
     assert r.wheel is None and len(r.imu) == 50
     assert any("wheel.csv: has 0 usable row(s) and needs 2" in str(w.message) for w in seen)
+
+
+def test_a_value_beyond_every_quantity_is_left_out(tmp_path):
+    imu(tmp_path, with_line(7, "0.5,1e308,0.2,9.8"))
+    with pytest.warns(RecordingWarning, match=r"imu.csv, line 7, column ax: 1e\+308 is not a number"):
+        assert len(read_recording(tmp_path).imu) == 49
