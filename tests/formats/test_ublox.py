@@ -13,7 +13,9 @@ WEEK = 604_800_000
 
 def pvt(itow: int, fix: int = 1) -> bytes:
     fields = {"velN": 12_345, "velE": -2_000, "velD": -250, "lat": 47.3977, "lon": 8.5456, "height": 488_250}
-    return UBXMessage("NAV", "NAV-PVT", GET, iTOW=itow % WEEK, gnssFixOk=fix, sAcc=150, **fields).serialize()
+    return UBXMessage(
+        "NAV", "NAV-PVT", GET, iTOW=itow % WEEK, fixType=3 * fix, gnssFixOk=fix, sAcc=150, **fields
+    ).serialize()
 
 
 def words(values) -> bytes:
@@ -112,5 +114,75 @@ def test_esf_raw_without_nav_pvt_cannot_be_dated(tmp_path):
 
 def test_a_file_without_any_of_it(tmp_path):
     (tmp_path / "x.ubx").write_bytes(b"$GNGGA,nothing*00\r\n" * 5)
-    with pytest.raises(RecordingError, match=r"x.ubx: has neither NAV-PVT nor ESF-RAW nor ESF-MEAS"):
+    with pytest.raises(RecordingError, match=r"x.ubx: has neither NAV-PVT nor NAV-PVAT nor NAV-VELNED nor ESF-RAW"):
         read_recording(tmp_path / "x.ubx")
+
+
+def meas_of(tag: int, values, provider: int = 0, stated: bool = True, calibrated: bool = False) -> bytes:
+    flags = (len(values) << 11 if stated else 0) | (8 if calibrated else 0)
+    payload = struct.pack("<IHH", tag, flags, provider) + words(values) + (bytes(4) if calibrated else b"")
+    return UBXMessage("ESF", "ESF-MEAS", GET, payload=payload).serialize()
+
+
+@pytest.mark.parametrize("calibrated", [False, True])
+def test_a_count_of_measurements_that_is_left_out_follows_from_the_length(tmp_path, calibrated):
+    log = b"".join(meas_of(20 * k, list(counts(k).items()), stated=False, calibrated=calibrated) for k in range(50))
+    (tmp_path / "x.ubx").write_bytes(log)
+    r = read_recording(tmp_path / "x.ubx")
+    np.testing.assert_allclose(r.imu.index, 0.02 * np.arange(50), atol=1e-9)
+    check_imu(r.imu, 50)
+
+
+@pytest.mark.parametrize("ahead", [0, 50, 30_000, 6_500_000])
+def test_the_speed_of_a_host_is_dated_by_its_own_clock(tmp_path, ahead):
+    log = b""
+    for k in range(500):
+        log += meas_of(7000 + 20 * k, list(counts(k).items())) + meas_of(
+            7000 + 20 * k + ahead, [(11, 10 * k)], provider=1
+        )
+        if k % 50 == 49:
+            log += pvt(400_000 + 20 * k)
+    (tmp_path / "x.ubx").write_bytes(log)
+    r = read_recording(tmp_path / "x.ubx")
+    np.testing.assert_allclose(r.gnss.index, 0.98 + np.arange(10), atol=1e-9)
+    shift = 0.05 if ahead == 50 else 0.0
+    np.testing.assert_allclose(r.wheel.index, shift + 0.02 * np.arange(500), atol=1e-9)
+    assert any("provider 1 counts" in note for note in r.notes) == (ahead > 50)
+
+
+@pytest.mark.parametrize("jump", [18_000, 7_200_000])
+def test_epochs_without_a_fix_do_not_date(tmp_path, jump):
+    log = b""
+    for k in range(600):
+        log += raw([(1000 + 256 * k, value) for value in counts(k).items()])
+        if k % 10 == 9:
+            log += pvt(400_000 + 10 * k - (jump if k < 200 else 0), fix=int(k >= 200))
+    (tmp_path / "x.ubx").write_bytes(log)
+    r = read_recording(tmp_path / "x.ubx")
+    np.testing.assert_allclose(r.imu.index, 0.01 * np.arange(600), atol=1e-6)
+    np.testing.assert_allclose(r.gnss.index, 2.09 + 0.1 * np.arange(40), atol=1e-6)
+    assert any("dated by the 40 of 60 epochs with a fix" in note for note in r.notes)
+
+
+def test_a_clock_that_is_set_under_way_is_said(tmp_path):
+    log = b""
+    for k in range(600):
+        log += raw([(1000 + 256 * k, value) for value in counts(k).items()])
+        if k % 10 == 9:
+            log += pvt(400_000 + 10 * k + (18_000 if k > 500 else 0))
+    (tmp_path / "x.ubx").write_bytes(log)
+    with pytest.warns(RecordingWarning, match="part by up to 18 s, as they do where a clock is set"):
+        r = read_recording(tmp_path / "x.ubx")
+    np.testing.assert_allclose(r.imu.index, 0.01 * np.arange(600), atol=1e-3)
+
+
+def test_wheel_ticks_become_speed_by_gnss(tmp_path):
+    log = b""
+    for k in range(500):
+        ticks = (2**16 - 100 + 15 * k) % 2**16
+        log += meas_of(20 * k, [*counts(k).items(), (8, ticks), (9, ticks)])
+        if k % 10 == 9:
+            log += pvt(400_000 + 20 * k)
+    (tmp_path / "x.ubx").write_bytes(log)
+    r = read_recording(tmp_path / "x.ubx")
+    np.testing.assert_allclose(r.wheel[["rear_left", "rear_right"]], np.hypot(2.0, 12.345), rtol=1e-6)
