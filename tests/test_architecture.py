@@ -38,7 +38,7 @@ LEVELS = [
     ["stages", "formats.stream_checks", "motion_estimate.start"],
     ["formats.tables", "formats.zip_files", "formats.ubx_frames", "calibration.records"],
     ["formats.ubx_solutions", "formats.ubx_ticks"],
-    ["formats.tidy_folder", "formats.comma2k19", "formats.ulog", "formats.ublox", "calibration.priors"],
+    ["formats.tidy_folder", "formats.comma2k19", "formats.ulog", "formats.ublox", "formats.dataflash", "calibration.priors"],
     ["formats.registry"],
     ["recordings", "calibration.reference_fit"],
     ["datasets", "drives"],

@@ -10,22 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from altijax.formats import (
-    aim,
-    androsensor,
-    comma2k19,
-    mixed_tables,
-    nmea,
-    phyphox,
-    racechrono,
-    rtklib,
-    sensor_logger,
-    tidy_folder,
-    ublox,
-    ulog,
-    vbo,
-)
-from altijax.formats.quantities import COLUMNS
+from altijax.formats import comma2k19, dataflash, tidy_folder, ublox, ulog
 from altijax.formats.stream_checks import RecordingError
 from altijax.formats.tables import Log
 from altijax.formats.text_tables import table_names
@@ -65,14 +50,7 @@ FORMATS = [
     Format("a comma2k19 segment (a folder with processed_log)", comma2k19.reads, comma2k19.read),
     Format("a PX4 ULog (.ulg)", ulog.reads, ulog.read),
     Format("a u-blox log (.ubx)", ublox.reads, ublox.read),
-    Format("an export of Sensor Logger", sensor_logger.reads, sensor_logger.read, fixes_units=False),
-    Format("of phyphox", phyphox.reads, phyphox.read, fixes_units=False),
-    Format("of AndroSensor (.csv)", androsensor.reads, androsensor.read, fixes_units=False),
-    Format("of RaceChrono (.csv)", racechrono.reads, racechrono.read, fixes_units=False),
-    Format("of AiM Race Studio (.csv)", aim.reads, aim.read, fixes_units=False),
-    Format("a Racelogic file (.vbo)", vbo.reads, vbo.read, fixes_units=False),
-    Format("an RTKLIB solution (.pos)", rtklib.reads, rtklib.read),
-    Format("an NMEA log (.nmea)", nmea.reads, nmea.read),
+    Format("an ArduPilot log (.bin)", dataflash.reads, dataflash.read),
 ]
 
 

@@ -98,12 +98,13 @@ def first_bytes(path: Path, count: int = 65536) -> bytes:
         return stream.read(count)
 
 
-def import_extra(name: str, path: Path) -> ModuleType:
-    """A package that only some formats need, or how to install it."""
+def import_extra(name: str, path: Path, extra: str = "logs") -> ModuleType:
+    """A module of a package that only some formats need, or which extra installs it."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"{path.name}: reading it needs {name}: pip install 'altijax[logs]'") from error
+        package = name.partition(".")[0]
+        raise ModuleNotFoundError(f"{path.name}: reading it needs {package}: pip install 'altijax[{extra}]'") from error
 
 
 def rotations_of(quaternions: np.ndarray) -> np.ndarray:
