@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pandas as pd
 
-from altijax.formats import comma2k19, dataflash, gopro, kitti, ros, tidy_folder, ublox, ulog
+from altijax.formats import comma2k19, dataflash, gopro, kitti, mdf, ros, tidy_folder, ublox, ulog
 from altijax.formats.stream_checks import RecordingError
 from altijax.formats.tables import Log
 from altijax.formats.text_tables import table_names
@@ -53,6 +53,7 @@ FORMATS = [
     Format("an ArduPilot log (.bin)", dataflash.reads, dataflash.read),
     Format("a GoPro video (.mp4)", gopro.reads, gopro.read),
     Format("a ROS bag (.bag, .mcap, .db3, or a folder with metadata.yaml)", ros.reads, ros.read, fixes_units=False),
+    Format("an MDF file (.mf4, .mdf)", mdf.reads, mdf.read, fixes_units=False),
     Format("a KITTI drive (a folder with oxts)", kitti.reads, kitti.read),
 ]
 
