@@ -121,18 +121,8 @@ class Recording:
         )
 
 
-def read_recording(
-    path: str | Path,
-    *,
-    axes: str | None = None,
-    units: Mapping[str, str] | None = None,
-    columns: Mapping[str, str] | None = None,
-) -> Recording:
-    """Read a recording: a tidy folder, a log of a known format, or by `columns` any table of text.
-
-    Known by their content, as a file, a folder or a zip of it: exports of the phone apps Sensor Logger, phyphox and
-    AndroSensor; NMEA, u-blox UBX, RTKLIB solutions (.pos); Racelogic .vbo, RaceChrono and AiM CSV; PX4 ULog; comma2k19
-    segments; and whatever `register_format` added. Excel workbooks are read like a folder of tables.
+def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[str, str] | None = None) -> Recording:
+    """Read a recording: a tidy folder, or one of the logs below.
 
     A tidy folder holds ``recording.toml`` and one CSV file (``.csv``, ``.csv.gz``, or ``.parquet``) a stream:
 
@@ -148,8 +138,23 @@ def read_recording(
     reference.csv  t and any of roll, pitch, heading (rad), v_e, v_n, v_u, lat, lon (deg), alt
     ============== =====================================================================================================
 
-    It keeps its times; the other formats start at 0 at the first IMU sample. Streams may start, stop and pause on their
-    own. What is wrong but leaves the rest usable is left out with a `RecordingWarning`, which also becomes a note.
+    Logs are known by their content, some need a package (``pip install 'altijax[logs]'``, ``[ros]``, ``[mdf]``):
+
+    ============== =====================================================================================================
+    u-blox UBX     ESF-RAW or ESF-MEAS with wheel ticks or speed; NAV-PVT, NAV-PVAT or NAV-VELNED
+    PX4 ULog       sensor_combined, the GNSS receiver, PX4's own estimate; [logs]
+    ArduPilot .bin IMU, GPS, GPA, WENC; ATT and POS as the reference; [logs]
+    ROS bags       ROS 1, ROS 2, MCAP: Imu, NavSatFix with a velocity, wheel speeds by their topics, Odometry as the
+                   reference; [ros]
+    GoPro videos   ACCL and GYRO in camera axes (x left, y back, z up), GPS9 or GPS5; [logs]
+    MDF            channels by name, such as AccX, YawRate, WheelSpeedFL, GPS_Speed, with their units; [mdf]
+    KITTI          an OXTS folder; velocities and pose are one solution
+    comma2k19      a segment: IMU, wheel speeds, u-blox receiver, its pose as the reference
+    ============== =====================================================================================================
+
+    A tidy folder keeps its times; the other formats start at 0 at the first IMU sample. Streams may start, stop and pause
+    on their own. What is wrong but leaves the rest usable is left out with a `RecordingWarning`, which also becomes a
+    note.
 
     Parameters
     ----------
