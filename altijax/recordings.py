@@ -121,8 +121,18 @@ class Recording:
         )
 
 
-def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[str, str] | None = None) -> Recording:
-    """Read a recording: a tidy folder, or one of the logs below.
+def read_recording(
+    path: str | Path,
+    *,
+    axes: str | None = None,
+    units: Mapping[str, str] | None = None,
+    columns: Mapping[str, str] | None = None,
+) -> Recording:
+    """Read a recording: a tidy folder, a log of a known format, or by `columns` any table of text.
+
+    Known by their content, as a file, a folder or a zip of it: exports of the phone apps Sensor Logger, phyphox and
+    AndroSensor; NMEA, RTKLIB solutions (.pos); Racelogic .vbo, RaceChrono and AiM CSV; the logs in the second table
+    below; and whatever `register_format` added. Excel workbooks are read like a folder of tables.
 
     A tidy folder holds ``recording.toml`` and one CSV file (``.csv``, ``.csv.gz``, or ``.parquet``) a stream:
 
@@ -152,9 +162,9 @@ def read_recording(path: str | Path, *, axes: str | None = None, units: Mapping[
     comma2k19      a segment: IMU, wheel speeds, u-blox receiver, its pose as the reference
     ============== =====================================================================================================
 
-    A tidy folder keeps its times; the other formats start at 0 at the first IMU sample. Streams may start, stop and pause
-    on their own. What is wrong but leaves the rest usable is left out with a `RecordingWarning`, which also becomes a
-    note.
+    A tidy folder keeps its times; the other formats start at 0 at the first IMU sample. Streams may start, stop and
+    pause on their own. What is wrong but leaves the rest usable is left out with a `RecordingWarning`, which also
+    becomes a note.
 
     Parameters
     ----------

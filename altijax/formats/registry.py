@@ -10,7 +10,27 @@ from pathlib import Path
 
 import pandas as pd
 
-from altijax.formats import comma2k19, dataflash, gopro, kitti, mdf, ros, tidy_folder, ublox, ulog
+from altijax.formats import (
+    aim,
+    androsensor,
+    comma2k19,
+    dataflash,
+    gopro,
+    kitti,
+    mdf,
+    mixed_tables,
+    nmea,
+    phyphox,
+    racechrono,
+    ros,
+    rtklib,
+    sensor_logger,
+    tidy_folder,
+    ublox,
+    ulog,
+    vbo,
+)
+from altijax.formats.quantities import COLUMNS
 from altijax.formats.stream_checks import RecordingError
 from altijax.formats.tables import Log
 from altijax.formats.text_tables import table_names
@@ -55,6 +75,14 @@ FORMATS = [
     Format("a ROS bag (.bag, .mcap, .db3, or a folder with metadata.yaml)", ros.reads, ros.read, fixes_units=False),
     Format("an MDF file (.mf4, .mdf)", mdf.reads, mdf.read, fixes_units=False),
     Format("a KITTI drive (a folder with oxts)", kitti.reads, kitti.read),
+    Format("an export of Sensor Logger", sensor_logger.reads, sensor_logger.read, fixes_units=False),
+    Format("of phyphox", phyphox.reads, phyphox.read, fixes_units=False),
+    Format("of AndroSensor (.csv)", androsensor.reads, androsensor.read, fixes_units=False),
+    Format("of RaceChrono (.csv)", racechrono.reads, racechrono.read, fixes_units=False),
+    Format("of AiM Race Studio (.csv)", aim.reads, aim.read, fixes_units=False),
+    Format("a Racelogic file (.vbo)", vbo.reads, vbo.read, fixes_units=False),
+    Format("an RTKLIB solution (.pos)", rtklib.reads, rtklib.read),
+    Format("an NMEA log (.nmea)", nmea.reads, nmea.read),
 ]
 
 
