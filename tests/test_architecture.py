@@ -45,6 +45,7 @@ LEVELS = [
     ["formats.tidy_folder", "formats.comma2k19", "formats.ulog", "formats.ublox", "calibration.priors"],
     ["formats.registry"],
     ["recordings", "calibration.reference_fit"],
+    ["conversions"],
     ["datasets", "drives"],
     ["motion_estimate.readings", "elevation_estimate.model", "elevation_estimate.smoother", "calibration.drives"],
     ["vehicle.parts", "vehicle.mounting"],
