@@ -1,7 +1,5 @@
 """A calibration: constants, how well they are known, and whether they help; as a table, and as a TOML file."""
 
-import json
-import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -14,6 +12,7 @@ import pandas as pd
 
 from altijax.calibration.identifiability import Identification, identify_information
 from altijax.calibration.parameters import CONSTANTS, triads
+from altijax.toml_lines import toml_key, toml_line
 
 # Less than this is no difference worth a word.
 _WORSE = 1.01
@@ -108,16 +107,21 @@ class Calibration:
             File to write; one that exists is replaced.
         """
         lines = ["# Calibration by AltiJAX: true = measured / scale - bias; see altijax.Calibration"]
-        lines += [_line("method", self.method), _line("undetermined", list(self.undetermined))]
-        lines += [_line("nis", self.nis), _line("converged", self.converged)]
-        lines += ["", "[noise]", *(_line(str(kind), level) for kind, level in self.noise.items())]
+        lines += [toml_line("method", self.method), toml_line("undetermined", list(self.undetermined))]
+        lines += [toml_line("nis", self.nis), toml_line("converged", self.converged)]
+        lines += ["", "[noise]", *(toml_line(str(kind), level) for kind, level in self.noise.items())]
         for name, row in self.table.iterrows():
-            lines += ["", f"[constants.{_key(str(name))}]", *(_line(key, row[key]) for key in _TABLE)]
+            lines += ["", f"[constants.{toml_key(str(name))}]", *(toml_line(key, row[key]) for key in _TABLE)]
         for title, frame in (("correlation", self.correlation), ("absorbed", self.absorbed)):
-            lines += ["", f"[{title}]", _line("columns", list(frame.columns))]
-            lines += [_line(str(name), row.tolist()) for name, row in frame.iterrows()]
+            lines += ["", f"[{title}]", toml_line("columns", list(frame.columns))]
+            lines += [toml_line(str(name), row.tolist()) for name, row in frame.iterrows()]
         for name, row in self.held_out.iterrows():
-            lines += ["", "[[held_out]]", _line("recording", name), *(_line(str(key), row[key]) for key in row.index)]
+            lines += [
+                "",
+                "[[held_out]]",
+                toml_line("recording", name),
+                *(toml_line(str(key), row[key]) for key in row.index),
+            ]
         Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     @classmethod
@@ -274,22 +278,3 @@ def held_out_row(
 def held_out_table(rows: Sequence[dict[str, str | float | bool]]) -> pd.DataFrame:
     """`Calibration.held_out` of such rows."""
     return pd.DataFrame(rows).set_index("recording") if rows else pd.DataFrame()
-
-
-def _line(key: str, value: object) -> str:
-    return f"{_key(key)} = {_toml(value)}"
-
-
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _toml(key)
-
-
-def _toml(value: object) -> str:
-    """A TOML value; Python writes a float by the fewest digits that give it back."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, bool | np.bool_):
-        return "true" if value else "false"
-    return repr(float(value))  # type: ignore[arg-type]

@@ -98,12 +98,12 @@ def first_bytes(path: Path, count: int = 65536) -> bytes:
         return stream.read(count)
 
 
-def import_extra(name: str, path: Path) -> ModuleType:
+def import_extra(name: str, path: Path, *, doing: str = "reading", extra: str = "logs") -> ModuleType:
     """A package that only some formats need, or how to install it."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
-        raise ModuleNotFoundError(f"{path.name}: reading it needs {name}: pip install 'altijax[logs]'") from error
+        raise ModuleNotFoundError(f"{path.name}: {doing} it needs {name}: pip install 'altijax[{extra}]'") from error
 
 
 def rotations_of(quaternions: np.ndarray) -> np.ndarray:
