@@ -1,17 +1,18 @@
 """A calibration: constants, how well they are known, and whether they help; as a table, and as a TOML file."""
 
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
 import pandas as pd
 
 from altijax.calibration.identifiability import Identification, identify_information
-from altijax.calibration.parameters import CONSTANTS, triads
+from altijax.calibration.parameters import ACCEPTED, CONSTANTS, triads
 from altijax.toml_lines import toml_key, toml_line
 
 # Less than this is no difference worth a word.
@@ -141,25 +142,19 @@ class Calibration:
         Raises
         ------
         ValueError
-            If the file is not TOML or lacks a part of a calibration.
+            If the file is not TOML, lacks a part of a calibration, or says what no calibration can: it names the entry.
         """
         try:
             found = tomllib.loads(Path(path).read_text(encoding="utf-8"))
             constants = found["constants"]
             rows = {name: [constants[name][key] for key in _TABLE] for name in constants}
-            matrices = {title: found[title] for title in ("correlation", "absorbed")}
-            frames = {
-                title: pd.DataFrame(
-                    [matrix[name] for name in constants if name in matrix],
-                    index=[name for name in constants if name in matrix],
-                    columns=matrix["columns"],
-                    dtype=float,
-                )
-                for title, matrix in matrices.items()
-            }
-            return cls(
+            frames = {title: _matrix(found[title], list(constants)) for title in ("correlation", "absorbed")}
+            # What is no standard deviation has no logarithm, and is told below.
+            with np.errstate(invalid="ignore", divide="ignore"):
+                table = constants_table(pd.DataFrame.from_dict(rows, orient="index", columns=list(_TABLE)))
+            calibration = cls(
                 method=found["method"],
-                table=constants_table(pd.DataFrame.from_dict(rows, orient="index", columns=list(_TABLE))),
+                table=table,
                 undetermined=tuple(found["undetermined"]),
                 held_out=held_out_table(found.get("held_out", [])),
                 noise=noise_levels(found.get("noise", {})),
@@ -167,8 +162,12 @@ class Calibration:
                 converged=found.get("converged", cls.converged),
                 **frames,
             )
-        except (tomllib.TOMLDecodeError, KeyError) as error:
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is not a calibration that `Calibration.save` wrote: {error!r}") from error
+        wrong = next(_impossible(calibration), None)
+        if wrong:
+            raise ValueError(f"{path}: {wrong}; calibrate again and save, or mend that entry by hand")
+        return calibration
 
     def __repr__(self) -> str:
         parts = [f"Calibration of {self.method!r}", self.table.to_string(), *self._noise(), *self.undetermined]
@@ -278,3 +277,43 @@ def held_out_row(
 def held_out_table(rows: Sequence[dict[str, str | float | bool]]) -> pd.DataFrame:
     """`Calibration.held_out` of such rows."""
     return pd.DataFrame(rows).set_index("recording") if rows else pd.DataFrame()
+
+
+def _matrix(entries: Mapping[str, list[Any]], constants: list[str]) -> pd.DataFrame:
+    names = [name for name in constants if name in entries]
+    short = [name for name in names if len(entries[name]) != len(entries["columns"])]
+    if short:
+        raise ValueError(f"the row of {short[0]} has {len(entries[short[0]])} values for columns {entries['columns']}")
+    return pd.DataFrame([entries[name] for name in names], names, entries["columns"], dtype=float)
+
+
+def _impossible(calibration: Calibration) -> Iterator[str]:
+    """What a calibration from a file says and cannot, in words: entry, what was seen, what is known."""
+    if calibration.method not in ACCEPTED:
+        yield f"method is {calibration.method!r}, known are {', '.join(ACCEPTED)}"
+    for name, row in calibration.table.iterrows():
+        if name not in CONSTANTS:
+            yield f"constants has {name!r}, known are {', '.join(CONSTANTS)}"
+        elif row["unit"] != CONSTANTS[str(name)].unit:
+            yield f"constants.{name}.unit is {row['unit']!r}, and it is in {CONSTANTS[str(name)].unit!r}"
+        for key in ("value", "std", "prior", "prior_std"):
+            if not np.isfinite(row[key]) and (name, key) != ("initial_vertical_speed", "prior"):
+                yield f"constants.{name}.{key} is {row[key]}, which is no number"
+        for key in ("std", "prior_std"):
+            if row[key] <= 0:
+                yield f"constants.{name}.{key} is {row[key]}, and must be positive"
+    names, correlation = list(calibration.table.index), calibration.correlation
+    if list(correlation.index) != names or list(correlation.columns) != names:
+        yield f"correlation has rows {list(correlation.index)} and columns {list(correlation.columns)} for {names}"
+        return
+    values = correlation.to_numpy(float)
+    # Rounding leaves a correlation of one above it, and its matrix not quite symmetric.
+    if not (np.isfinite(values).all() and np.abs(values).max(initial=0) < 1 + 1e-6):
+        yield "correlation has a value that is not between -1 and 1"
+    elif not np.allclose(values, values.T, atol=1e-6) or not np.allclose(np.diag(values), 1, atol=1e-6):
+        yield "correlation is not symmetric with ones on its diagonal"
+    if list(calibration.absorbed.index) not in (names, []):
+        yield f"absorbed has rows {list(calibration.absorbed.index)} for {names}"
+    unknown = [name for name in calibration.absorbed.columns if name not in CONSTANTS]
+    if unknown:
+        yield f"absorbed has columns {unknown}, which are no constants"
