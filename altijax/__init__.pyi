@@ -25,6 +25,7 @@ from . import (
     smoothing as smoothing,
     speed as speed,
     strapdown as strapdown,
+    tables as tables,
     wahba as wahba,
     wheels as wheels,
 )
@@ -242,6 +243,10 @@ from .strapdown import (
     integrate_attitude as integrate_attitude,
     integrate_position as integrate_position,
     integrate_velocity as integrate_velocity,
+)
+from .tables import (
+    recording_from_tables as recording_from_tables,
+    save_estimate as save_estimate,
 )
 from .vehicle.estimates import estimate_drive as estimate_drive
 from .wahba import (

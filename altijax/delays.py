@@ -9,6 +9,7 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import require_shape
+from altijax._values import checked, increasing
 from altijax.signals import cumulative_integral, low_pass, resample
 
 
@@ -36,6 +37,7 @@ class Delay:
     ambiguous: jax.Array
 
 
+@checked(t=increasing, t_gnss=increasing)
 @partial(jax.jit, static_argnames="max_delay")
 def estimate_delay(t: ArrayLike, a: ArrayLike, t_gnss: ArrayLike, v_gnss: ArrayLike, max_delay: float = 1.0) -> Delay:
     """Delay at which accelerations agree best with the changes of GNSS velocity.

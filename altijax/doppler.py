@@ -12,6 +12,7 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import require_shape
+from altijax._values import checked, increasing
 from altijax.rotations import yaw_to_heading
 
 
@@ -44,6 +45,7 @@ class DopplerReceiver:
     dropout_probability: ArrayLike = 0.0
 
 
+@checked(t=increasing)
 @partial(jax.jit, static_argnames="epochs")
 def doppler_velocity(
     receiver: DopplerReceiver, t: ArrayLike, v_n: ArrayLike, *, epochs: int, key: jax.Array

@@ -6,8 +6,10 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import require_shape
+from altijax._values import checked, samples
 
 
+@checked(error=samples(1))
 def rms(error: ArrayLike) -> jax.Array:
     """Root mean square of an error series.
 
@@ -25,6 +27,7 @@ def rms(error: ArrayLike) -> jax.Array:
     return _safe.sqrt(jnp.mean(error * error, -1))
 
 
+@checked(error=samples(1))
 def rms_without_offset(error: ArrayLike) -> jax.Array:
     """Root mean square of an error series less its mean: what is left when the height datum is free.
 
@@ -62,6 +65,7 @@ def accuracy_denominator(actual: ArrayLike, error: ArrayLike) -> jax.Array:
     return jnp.where(exact, jnp.inf, jnp.abs(actual / jnp.where(exact, 1, error)))
 
 
+@checked(error=samples(1))
 def coverage(error: ArrayLike, std: ArrayLike, multiple: ArrayLike) -> jax.Array:
     """Share of samples whose error lies within a multiple of the stated standard deviation.
 

@@ -4,16 +4,17 @@ import html
 import math
 import warnings
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 
 from altijax.formats.containers import only_file, unpacked
 from altijax.formats.mixed_tables import read_mixed
-from altijax.formats.quantities import QUANTITIES, WHEELS, check_units, in_si_units
+from altijax.formats.quantities import QUANTITIES, WHEELS, check_units, in_si_units, si_units
 from altijax.formats.registry import described, format_of
 from altijax.formats.stream_checks import (
     RecordingError,
@@ -31,6 +32,7 @@ from altijax.formats.stream_checks import (
 )
 from altijax.formats.tables import at_accelerometer_times
 from altijax.formats.tidy_folder import wheel_from_pulses
+from altijax.formats.tidy_writer import write_sheet, write_tidy_folder
 
 _ACCELEROMETER, _GYRO, _VELOCITY = ["ax", "ay", "az"], ["gx", "gy", "gz"], ["v_e", "v_n", "v_u"]
 _STREAMS = ("imu", "wheel", "gnss", "reference")
@@ -109,6 +111,61 @@ class Recording:
     source: str = ""
     notes: tuple[str, ...] = ()
 
+    def save(self, folder: str | Path, *, form: str = "csv") -> None:
+        """Write the recording as a tidy folder, from which `read_recording` gets the same: streams to the last bit.
+
+        The folder's recording.toml says the units and keeps the notes, which are not told again; `source` is not kept.
+
+        Parameters
+        ----------
+        folder : path
+            Folder to write, made where it is not there.
+        form : str, optional
+            "csv", "csv.gz" or "parquet".
+
+        Raises
+        ------
+        FileExistsError
+            If the folder holds a recording already.
+        ValueError
+            If the recording has no IMU, the form is none of these, or the files do not give the recording back.
+        """
+        folder = Path(folder)
+        if self.imu is None:
+            raise ValueError(
+                f"recording {self.name!r} has no imu, which a tidy folder needs; save its streams by pandas"
+            )
+        C = axes_to_matrix(self.axes)
+        tables = {stream: getattr(self, stream) for stream in _STREAMS if getattr(self, stream) is not None}
+        for triad in (_ACCELEROMETER, _GYRO):
+            if triad[0] in self.imu.columns:
+                tables["imu"] = tables["imu"].assign(
+                    **dict(zip(triad, C.T @ self.imu[triad].to_numpy().T, strict=True))
+                )
+        sheet = {
+            "name": self.name,
+            "description": self.description,
+            "axes": self.axes,
+            "wheel": {
+                "pulses_per_turn": self.pulses_per_turn,
+                "radius": self.wheel_radius,
+                "track_width": self.track_width,
+            },
+            "site": {"latitude": _degrees(self.site_latitude), "height": self.site_height},
+            "units": si_units({stream: table.reset_index() for stream, table in tables.items()}),
+        }
+        write_tidy_folder(folder, tables, sheet, form)
+        # What is found in these files is known: it need not be told again, and its words name other files.
+        again, _ = _read(folder, None, {})
+        write_sheet(folder, sheet | {"saved": {"notes": self.notes, "known": again.notes}})
+        for stream in tables:
+            if not getattr(self, stream).equals(getattr(again, stream)):
+                raise ValueError(
+                    f"{folder}: the stream {stream} does not come back equal; either it is not as read_recording gives "
+                    "it (order of times and columns: make the recording by recording_from_tables), or a pandas before "
+                    "3.1 rounds the last digits of a CSV: save with form='parquet'"
+                )
+
     def __repr__(self) -> str:
         lines = [f"Recording {self.name!r}, axes {self.axes}: {self.description}", _formatted(self).to_string()]
         return "\n".join(lines + [f"note: {note}" for note in self.notes])
@@ -138,7 +195,8 @@ def read_recording(
 
     ============== =====================================================================================================
     recording.toml name, description, axes; [wheel] pulses_per_turn, radius (m), track_width (m); [site] latitude (deg),
-                   height (m); [source] origin, licence; all of it optional
+                   height (m); [units] as `units` below; [clock] seconds to add to the times of imu, wheel, pulses,
+                   gnss or reference; [source] origin, licence; all of it optional
     imu.csv        t, ax, ay, az; optional gx, gy, gz, temperature
     wheel.csv      t and speed, or left, right, or front_left, front_right, rear_left, rear_right
     pulses.csv     t, wheel (its name as above): one row a pulse, instead of wheel.csv; recorded as long as the IMU, for
@@ -173,11 +231,12 @@ def read_recording(
     axes : str, optional
         Where the sensor's x, y and z point: F or B, L or R, U or D; overrides what the recording says.
     units : mapping of str to str, optional
-        Units of a tidy folder or a table where they are not those above, by quantity: ``time`` (s, ms, us, ns; all
-        files), ``accelerometer`` (m/s^2, g, mg, gal; -m/s^2 and -g with the sign of iOS), ``gyro`` (rad/s, deg/s),
-        ``speed`` (m/s, km/h, mph, kn; wheel.csv), ``gnss_speed`` (the same; velocities and their deviations in
-        gnss.csv), ``course`` (deg, rad; gnss.csv), ``height`` (m, ft), ``attitude`` (rad, deg; reference.csv). A unit
-        that is stated is not doubted: its check is left out, and what the table says of it does not count.
+        Units of a tidy folder or a table where they are neither those above nor in its recording.toml, by quantity:
+        ``time`` (s, ms, us, ns; all files), ``accelerometer`` (m/s^2, g, mg, gal; -m/s^2 and -g with the sign of iOS),
+        ``gyro`` (rad/s, deg/s), ``speed`` (m/s, km/h, mph, kn; wheel.csv), ``gnss_speed`` (the same; velocities and
+        their deviations in gnss.csv), ``course`` (deg, rad; gnss.csv), ``height`` (m, ft), ``attitude`` (rad, deg;
+        reference.csv). A unit that is stated is not doubted: its check is left out, and what the table says of it does
+        not count.
     columns : mapping of str to str, optional
         For one table of text in which several sensors stand, however its columns are called: the header of each of
         our columns, ``{"t": "Time", "ax": "Acc X [g]", "speed": "v (km/h)"}``. Where a name could mean several streams
@@ -199,10 +258,21 @@ def read_recording(
     ValueError
         If `axes`, `units` or `columns` is not valid.
     """
-    path, units = Path(path), dict(units or {})
+    recording, problems = _read(Path(path), axes, dict(units or {}), columns)
+    tell(problems)
+    return recording
+
+
+def tell(problems: Collection[str]) -> None:
+    """Show what was left out or looks wrong to whoever called the function that calls this one."""
+    for problem in problems:
+        warnings.warn(problem, RecordingWarning, stacklevel=3)
+
+
+def _read(
+    path: Path, axes: str | None, units: Mapping[str, str], columns: Mapping[str, str] | None = None
+) -> tuple[Recording, list[str]]:
     check_units(units)
-    if axes is not None:
-        axes_to_matrix(axes)
     problems: list[str] = []
     notes: list[str] = []
     with unpacked(path) as place:
@@ -215,31 +285,76 @@ def read_recording(
         if fixes_units and units:
             raise ValueError(f"units is for a tidy folder; the format of {path} fixes its units")
         tables, sheet = read(place, problems, notes)
+    sheet = {"name": place.resolve().name, **sheet}
     tables = described(tables, place, problems)
-    in_si_units(tables, units)
-    stated: Collection[str] = QUANTITIES if fixes_units else units.keys()
+    given = dict.fromkeys(QUANTITIES) if fixes_units else units
+    recording, problems = recording_of(tables, sheet, problems, notes, axes=axes, given=given)
+    return replace(recording, source=str(path)), problems
+
+
+def recording_of(
+    tables: dict[str, pd.DataFrame],
+    sheet: Mapping[str, Any],
+    problems: list[str],
+    notes: list[str],
+    *,
+    axes: str | None = None,
+    given: Mapping[str, str | None],
+) -> tuple[Recording, list[str]]:
+    """Streams checked, in SI units and body axes; and what is to be told.
+
+    Parameters
+    ----------
+    tables : dict of str to DataFrame
+        Streams by name, as `stream_checks` has tables.
+    sheet : mapping
+        What a recording.toml says, or would.
+    problems, notes : list of str
+        What reading has found so far; `problems` grows.
+    axes : str, optional
+        Overrides what the sheet says.
+    given : mapping
+        Units by quantity, over what the sheet says; None where the tables are in SI units already.
+
+    Returns
+    -------
+    recording : Recording
+        The recording, without a source.
+    problems : list of str
+        All problems but those that the sheet knows already.
+    """
+    if axes is not None:
+        axes_to_matrix(axes)
+    own = {quantity: unit for quantity, unit in sheet.get("units", {}).items() if quantity not in given}
+    try:
+        in_si_units(tables, own)
+    except ValueError as error:
+        raise RecordingError(f"recording.toml, {error}") from error
+    in_si_units(tables, {quantity: unit for quantity, unit in given.items() if unit is not None})
+    clock = sheet.get("clock", {})
+    tables = {stream: table.assign(t=table["t"] + clock.get(stream, 0.0)) for stream, table in tables.items()}
+    stated = own.keys() | given.keys()
     if axes is None:
         axes = sheet.get("axes", "FLU")
         try:
             axes_to_matrix(axes)
         except ValueError as error:
             raise RecordingError(f"recording.toml, {error}") from error
-    streams: dict[str, pd.DataFrame | None] = {}
+    streams: dict[str, Any] = {}
     for stream in _STREAMS:
         table, imu = tables.get(stream), streams.get("imu")
         if stream == "wheel" and "pulses" in tables and imu is not None:
             table = wheel_from_pulses(tables["pulses"], sheet.get("wheel", {}), imu, problems)
         streams[stream] = None if table is None else _stream(stream, table, stated, axes, problems, notes)
     check_together(streams, stated, problems)
-    for problem in problems:
-        warnings.warn(problem, RecordingWarning, stacklevel=2)
-    wheel, site = sheet.get("wheel", {}), sheet.get("site", {})
+    wheel, site, saved = (sheet.get(part, {}) for part in ("wheel", "site", "saved"))
     latitude = site.get("latitude")
     for frame in streams.values():
         if frame is not None:
             frame.attrs = {}
-    return Recording(
-        name=sheet.get("name", place.resolve().name),
+    problems, notes = ([line for line in lines if line not in saved.get("known", ())] for lines in (problems, notes))
+    recording = Recording(
+        name=sheet.get("name", ""),
         description=sheet.get("description", ""),
         **streams,
         axes=axes,
@@ -248,9 +363,9 @@ def read_recording(
         track_width=wheel.get("track_width"),
         site_latitude=None if latitude is None else math.radians(latitude),
         site_height=site.get("height"),
-        source=str(path),
-        notes=tuple(problems + notes),
+        notes=(*saved.get("notes", ()), *problems, *notes),
     )
+    return recording, problems
 
 
 def describe(recording: Recording) -> pd.DataFrame:
@@ -291,6 +406,15 @@ def describe(recording: Recording) -> pd.DataFrame:
             "columns": ", ".join(frame.columns),
         }
     return pd.DataFrame.from_dict(rows, orient="index").rename_axis("stream")
+
+
+def _degrees(latitude: float | None) -> float | None:
+    """Degrees from which reading gets the same radians, where there are such."""
+    if latitude is None:
+        return None
+    near = math.degrees(latitude)
+    candidates = [near, math.nextafter(near, -math.inf), math.nextafter(near, math.inf)]
+    return min(candidates, key=lambda degrees: abs(math.radians(degrees) - latitude))
 
 
 def _formatted(recording: Recording) -> pd.DataFrame:

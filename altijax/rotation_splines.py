@@ -7,9 +7,11 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
+from altijax._values import checked, increasing
 from altijax.rotations import matrix_to_rotvec, rotvec_to_matrix, skew
 
 
+@checked(t_knots=increasing)
 @jax.jit
 def rotation_spline(t: ArrayLike, t_knots: ArrayLike, C_knots: ArrayLike) -> tuple[jax.Array, jax.Array]:
     """Rotations and rates of turn of a smooth curve through given rotations.

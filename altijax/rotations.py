@@ -11,6 +11,7 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import require_shape
+from altijax._values import checked, increasing
 
 
 def wrap_angle(angle: ArrayLike) -> jax.Array:
@@ -293,6 +294,7 @@ def matrix_to_rotvec(C: ArrayLike) -> jax.Array:
     return 2 * jnp.where(small, series, jnp.arctan2(s, w) / s) * v
 
 
+@checked(t_knots=increasing)
 def interpolate_rotations(t: ArrayLike, t_knots: ArrayLike, C_knots: ArrayLike) -> jax.Array:
     """Rotations between given ones, each pair joined by a turn at constant rate (slerp).
 

@@ -10,8 +10,10 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
+from altijax._values import checked, increasing, not_decreasing, positive
 
 
+@checked(t=increasing)
 def derivative(t: ArrayLike, values: ArrayLike, axis: int = -1) -> jax.Array:
     """Time derivative by the parabola through three neighbouring samples, exact for parabolas at the ends too.
 
@@ -45,6 +47,7 @@ def derivative(t: ArrayLike, values: ArrayLike, axis: int = -1) -> jax.Array:
     return jnp.moveaxis(jnp.concatenate([first, inner, last], -1), -1, axis)
 
 
+@checked(t=not_decreasing)
 @partial(jax.jit, static_argnames="axis")
 def cumulative_integral(t: ArrayLike, values: ArrayLike, axis: int = -1) -> jax.Array:
     """Integral from the first sample to each sample by the trapezoidal rule.
@@ -81,6 +84,7 @@ def cumulative_integral(t: ArrayLike, values: ArrayLike, axis: int = -1) -> jax.
     return jnp.moveaxis(integral, -1, axis)
 
 
+@checked(t=increasing, cutoff=positive)
 def low_pass(t: ArrayLike, values: ArrayLike, cutoff: ArrayLike, axis: int = -1) -> jax.Array:
     """Zero-phase low pass: a digital second-order Butterworth filter run forward and backward.
 
@@ -121,6 +125,7 @@ def low_pass(t: ArrayLike, values: ArrayLike, cutoff: ArrayLike, axis: int = -1)
     return jnp.moveaxis(line + filtered, -1, axis)
 
 
+@checked(t_samples=not_decreasing)
 def resample(
     t: ArrayLike, t_samples: ArrayLike, values: ArrayLike, max_gap: ArrayLike, axis: int = -1
 ) -> tuple[jax.Array, jax.Array]:
@@ -168,6 +173,7 @@ def resample(
     return jnp.moveaxis(at_t, -1, axis), on_sample | ((t == held) & (gap <= max_gap))
 
 
+@checked(t=increasing)
 def fourier_reconstruction(t: ArrayLike, values: ArrayLike, t_new: ArrayLike) -> jax.Array:
     """Value, at any time, of the trigonometric polynomial through the samples, of period n dt.
 
@@ -196,6 +202,7 @@ def fourier_reconstruction(t: ArrayLike, values: ArrayLike, t_new: ArrayLike) ->
     return _fourier_means(t, values, t_new, jnp.zeros_like(t_new))
 
 
+@checked(t=increasing, edges=not_decreasing)
 def fourier_interval_means(t: ArrayLike, values: ArrayLike, edges: ArrayLike) -> jax.Array:
     """Exact means, between consecutive edges, of the trigonometric polynomial through the samples.
 
@@ -226,6 +233,7 @@ def fourier_interval_means(t: ArrayLike, values: ArrayLike, edges: ArrayLike) ->
     return _fourier_means(t, values, 0.5 * (edges[1:] + edges[:-1]), jnp.diff(edges))
 
 
+@checked(t=increasing, edges=not_decreasing)
 def interval_means(t: ArrayLike, values: ArrayLike, edges: ArrayLike) -> jax.Array:
     """Exact means, between consecutive edges, of the straight lines through the samples.
 
@@ -266,6 +274,7 @@ def interval_means(t: ArrayLike, values: ArrayLike, edges: ArrayLike) -> jax.Arr
     return jnp.where(some, jnp.diff(up_to, axis=-1) / jnp.where(some, width, 1), at_edge[..., 1:])
 
 
+@checked(t=increasing)
 def periodic_extension(t: ArrayLike, values: ArrayLike) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Series continued so that its ends meet, for the Fourier functions, and the line that was taken off before.
 

@@ -13,6 +13,7 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import require_shape
+from altijax._values import checked, increasing, samples
 from altijax.signals import cumulative_integral
 
 State = tuple[jax.Array, ...]
@@ -51,6 +52,7 @@ class SmoothVelocity:
     log_likelihood: jax.Array
 
 
+@checked(t=increasing, a=samples(1), t_gnss=increasing, v_gnss=samples(1))
 @jax.jit
 def smooth_velocity(
     t: ArrayLike,
@@ -138,6 +140,7 @@ def smooth_velocity(
     )
 
 
+@checked(t=increasing, a=samples(1), t_gnss=increasing, v_gnss=samples(1))
 @jax.jit
 def match_endpoints(t: ArrayLike, a: ArrayLike, t_gnss: ArrayLike, v_gnss: ArrayLike) -> jax.Array:
     """Velocity from integrated acceleration, made to meet each GNSS velocity by a constant bias between the two.

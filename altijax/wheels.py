@@ -18,6 +18,7 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import record_field, require_shape
+from altijax._values import checked, increasing
 from altijax.signals import cumulative_integral
 
 
@@ -150,6 +151,7 @@ def pulse_distance(wheel: WheelSensor) -> jax.Array:
     return 2 * jnp.pi / wheel.pulses_per_turn * radius * _true_over_shown(wheel, radius.dtype)
 
 
+@checked(t=increasing)
 def wheel_pulses(
     wheel: WheelSensor, t: ArrayLike, speed: ArrayLike, yaw_rate: ArrayLike, *, max_pulses: int
 ) -> tuple[jax.Array, jax.Array]:
@@ -200,6 +202,7 @@ def wheel_pulses(
     return jnp.where(reached, t[i] + wait, jnp.inf), (_passed(wheel, angle[..., -1:]) - before)[..., 0]
 
 
+@checked(t_pulses=increasing)
 @jax.jit
 def way_from_pulses(t_pulses: ArrayLike, t: ArrayLike, distance: ArrayLike) -> jax.Array:
     """Way of one wheel, counted from its first pulse; at each pulse it is the number of pulses times `distance`.
@@ -228,6 +231,7 @@ def way_from_pulses(t_pulses: ArrayLike, t: ArrayLike, distance: ArrayLike) -> j
     return distance[..., None] * passed
 
 
+@checked(t_pulses=increasing)
 @jax.jit
 def speed_from_pulses(
     t_pulses: ArrayLike, t: ArrayLike, distance: ArrayLike, distance_std: ArrayLike = 0.0
@@ -270,6 +274,7 @@ def speed_from_pulses(
     return distance * rate, _safe.norm(jnp.stack(parts, -1))
 
 
+@checked(t_pulses=increasing)
 @jax.jit
 def standstill_from_pulses(t_pulses: ArrayLike, t: ArrayLike, quiet: ArrayLike) -> jax.Array:
     """Whether a wheel is taken to stand still: no pulse for long, before and after.

@@ -1,19 +1,19 @@
 """A calibration: constants, how well they are known, and whether they help; as a table, and as a TOML file."""
 
-import json
-import re
 import tomllib
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 import jax
 import numpy as np
 import pandas as pd
 
 from altijax.calibration.identifiability import Identification, identify_information
-from altijax.calibration.parameters import CONSTANTS, triads
+from altijax.calibration.parameters import ACCEPTED, CONSTANTS, triads
+from altijax.toml_lines import toml_key, toml_line
 
 # Less than this is no difference worth a word.
 _WORSE = 1.01
@@ -108,16 +108,21 @@ class Calibration:
             File to write; one that exists is replaced.
         """
         lines = ["# Calibration by AltiJAX: true = measured / scale - bias; see altijax.Calibration"]
-        lines += [_line("method", self.method), _line("undetermined", list(self.undetermined))]
-        lines += [_line("nis", self.nis), _line("converged", self.converged)]
-        lines += ["", "[noise]", *(_line(str(kind), level) for kind, level in self.noise.items())]
+        lines += [toml_line("method", self.method), toml_line("undetermined", list(self.undetermined))]
+        lines += [toml_line("nis", self.nis), toml_line("converged", self.converged)]
+        lines += ["", "[noise]", *(toml_line(str(kind), level) for kind, level in self.noise.items())]
         for name, row in self.table.iterrows():
-            lines += ["", f"[constants.{_key(str(name))}]", *(_line(key, row[key]) for key in _TABLE)]
+            lines += ["", f"[constants.{toml_key(str(name))}]", *(toml_line(key, row[key]) for key in _TABLE)]
         for title, frame in (("correlation", self.correlation), ("absorbed", self.absorbed)):
-            lines += ["", f"[{title}]", _line("columns", list(frame.columns))]
-            lines += [_line(str(name), row.tolist()) for name, row in frame.iterrows()]
+            lines += ["", f"[{title}]", toml_line("columns", list(frame.columns))]
+            lines += [toml_line(str(name), row.tolist()) for name, row in frame.iterrows()]
         for name, row in self.held_out.iterrows():
-            lines += ["", "[[held_out]]", _line("recording", name), *(_line(str(key), row[key]) for key in row.index)]
+            lines += [
+                "",
+                "[[held_out]]",
+                toml_line("recording", name),
+                *(toml_line(str(key), row[key]) for key in row.index),
+            ]
         Path(path).write_text("\n".join(lines) + "\n", encoding="utf-8")
 
     @classmethod
@@ -137,25 +142,19 @@ class Calibration:
         Raises
         ------
         ValueError
-            If the file is not TOML or lacks a part of a calibration.
+            If the file is not TOML, lacks a part of a calibration, or says what no calibration can: it names the entry.
         """
         try:
             found = tomllib.loads(Path(path).read_text(encoding="utf-8"))
             constants = found["constants"]
             rows = {name: [constants[name][key] for key in _TABLE] for name in constants}
-            matrices = {title: found[title] for title in ("correlation", "absorbed")}
-            frames = {
-                title: pd.DataFrame(
-                    [matrix[name] for name in constants if name in matrix],
-                    index=[name for name in constants if name in matrix],
-                    columns=matrix["columns"],
-                    dtype=float,
-                )
-                for title, matrix in matrices.items()
-            }
-            return cls(
+            frames = {title: _matrix(found[title], list(constants)) for title in ("correlation", "absorbed")}
+            # What is no standard deviation has no logarithm, and is told below.
+            with np.errstate(invalid="ignore", divide="ignore"):
+                table = constants_table(pd.DataFrame.from_dict(rows, orient="index", columns=list(_TABLE)))
+            calibration = cls(
                 method=found["method"],
-                table=constants_table(pd.DataFrame.from_dict(rows, orient="index", columns=list(_TABLE))),
+                table=table,
                 undetermined=tuple(found["undetermined"]),
                 held_out=held_out_table(found.get("held_out", [])),
                 noise=noise_levels(found.get("noise", {})),
@@ -163,8 +162,12 @@ class Calibration:
                 converged=found.get("converged", cls.converged),
                 **frames,
             )
-        except (tomllib.TOMLDecodeError, KeyError) as error:
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError, KeyError, TypeError, ValueError) as error:
             raise ValueError(f"{path} is not a calibration that `Calibration.save` wrote: {error!r}") from error
+        wrong = next(_impossible(calibration), None)
+        if wrong:
+            raise ValueError(f"{path}: {wrong}; calibrate again and save, or mend that entry by hand")
+        return calibration
 
     def __repr__(self) -> str:
         parts = [f"Calibration of {self.method!r}", self.table.to_string(), *self._noise(), *self.undetermined]
@@ -276,20 +279,41 @@ def held_out_table(rows: Sequence[dict[str, str | float | bool]]) -> pd.DataFram
     return pd.DataFrame(rows).set_index("recording") if rows else pd.DataFrame()
 
 
-def _line(key: str, value: object) -> str:
-    return f"{_key(key)} = {_toml(value)}"
+def _matrix(entries: Mapping[str, list[Any]], constants: list[str]) -> pd.DataFrame:
+    names = [name for name in constants if name in entries]
+    short = [name for name in names if len(entries[name]) != len(entries["columns"])]
+    if short:
+        raise ValueError(f"the row of {short[0]} has {len(entries[short[0]])} values for columns {entries['columns']}")
+    return pd.DataFrame([entries[name] for name in names], names, entries["columns"], dtype=float)
 
 
-def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _toml(key)
-
-
-def _toml(value: object) -> str:
-    """A TOML value; Python writes a float by the fewest digits that give it back."""
-    if isinstance(value, list):
-        return f"[{', '.join(map(_toml, value))}]"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, bool | np.bool_):
-        return "true" if value else "false"
-    return repr(float(value))  # type: ignore[arg-type]
+def _impossible(calibration: Calibration) -> Iterator[str]:
+    """What a calibration from a file says and cannot, in words: entry, what was seen, what is known."""
+    if calibration.method not in ACCEPTED:
+        yield f"method is {calibration.method!r}, known are {', '.join(ACCEPTED)}"
+    for name, row in calibration.table.iterrows():
+        if name not in CONSTANTS:
+            yield f"constants has {name!r}, known are {', '.join(CONSTANTS)}"
+        elif row["unit"] != CONSTANTS[str(name)].unit:
+            yield f"constants.{name}.unit is {row['unit']!r}, and it is in {CONSTANTS[str(name)].unit!r}"
+        for key in ("value", "std", "prior", "prior_std"):
+            if not np.isfinite(row[key]) and (name, key) != ("initial_vertical_speed", "prior"):
+                yield f"constants.{name}.{key} is {row[key]}, which is no number"
+        for key in ("std", "prior_std"):
+            if row[key] <= 0:
+                yield f"constants.{name}.{key} is {row[key]}, and must be positive"
+    names, correlation = list(calibration.table.index), calibration.correlation
+    if list(correlation.index) != names or list(correlation.columns) != names:
+        yield f"correlation has rows {list(correlation.index)} and columns {list(correlation.columns)} for {names}"
+        return
+    values = correlation.to_numpy(float)
+    # Rounding leaves a correlation of one above it, and its matrix not quite symmetric.
+    if not (np.isfinite(values).all() and np.abs(values).max(initial=0) < 1 + 1e-6):
+        yield "correlation has a value that is not between -1 and 1"
+    elif not np.allclose(values, values.T, atol=1e-6) or not np.allclose(np.diag(values), 1, atol=1e-6):
+        yield "correlation is not symmetric with ones on its diagonal"
+    if list(calibration.absorbed.index) not in (names, []):
+        yield f"absorbed has rows {list(calibration.absorbed.index)} for {names}"
+    unknown = [name for name in calibration.absorbed.columns if name not in CONSTANTS]
+    if unknown:
+        yield f"absorbed has columns {unknown}, which are no constants"

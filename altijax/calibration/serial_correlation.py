@@ -5,8 +5,10 @@ import jax.numpy as jnp
 from jax.typing import ArrayLike
 
 from altijax._shapes import require_shape
+from altijax._values import checked, samples
 
 
+@checked(series=samples(2))
 def statistical_inefficiency(series: ArrayLike) -> jax.Array:
     """Number of neighbouring samples that count as one: 1 + 2 times the sum of the autocorrelations.
 
@@ -41,6 +43,7 @@ def statistical_inefficiency(series: ArrayLike) -> jax.Array:
     return jnp.maximum(2 * jnp.sum(together * correlation, -1) - 1, 1)
 
 
+@checked(series=samples(2))
 def mean_with_std(series: ArrayLike) -> tuple[jax.Array, jax.Array]:
     """Mean of a correlated series and its standard deviation.
 

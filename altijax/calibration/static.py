@@ -15,6 +15,7 @@ from jax.typing import ArrayLike
 
 from altijax import _safe
 from altijax._shapes import require_shape
+from altijax._values import checked, varying
 from altijax.calibration.serial_correlation import mean_with_std, statistical_inefficiency
 from altijax.least_squares import levenberg_marquardt
 from altijax.sensors import Accelerometer, Gyro, correct_accelerometer
@@ -121,6 +122,7 @@ def fit_accelerometer_positions(
     )
 
 
+@checked(w_b=varying)
 def fit_gyro_at_rest(w_b: ArrayLike) -> SensorFit:
     """Bias of a triad of gyros from readings at rest, with the standard deviation that their correlation leaves.
 

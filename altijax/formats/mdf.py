@@ -74,7 +74,7 @@ def read(path: Path, problems: list[str], notes: list[str]) -> Log:
 
     Axes are those of ISO 8855: forward, left, up.
     """
-    asammdf = import_extra("asammdf", path, "mdf")
+    asammdf = import_extra("asammdf", path, extra="mdf")
     damaged = (asammdf.blocks.utils.MdfException, struct.error, ValueError)
     try:
         with asammdf.MDF(path) as file:

@@ -112,3 +112,12 @@ def in_si_units(tables: dict[str, pd.DataFrame], units: Mapping[str, str]) -> No
             raise ValueError(
                 f"units gives {quantity!r} in {unit!r}, but the recording has none of its columns ({places})"
             )
+
+
+def si_units(tables: Mapping[str, pd.DataFrame]) -> dict[str, str]:
+    """The unit that stands unscaled, of each quantity of which the tables have a column."""
+    return {
+        quantity: next(unit for unit, factor in factors.items() if factor == 1)
+        for quantity, (factors, targets) in _UNITS.items()
+        if any(set(targets[stream]) & set(tables[stream].columns) for stream in targets.keys() & tables.keys())
+    }

@@ -122,12 +122,12 @@ def read(path: Path, problems: list[str], notes: list[str]) -> Log:
 
 def _series(path: Path, problems: list[str], notes: list[str]) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Times and numbers of one topic of each kind."""
-    rosbags = import_extra("rosbags.highlevel", path, "ros")
-    typesys = import_extra("rosbags.typesys", path, "ros")
+    rosbags = import_extra("rosbags.highlevel", path, extra="ros")
+    typesys = import_extra("rosbags.typesys", path, extra="ros")
     errors = (
         rosbags.AnyReaderError,
-        import_extra("rosbags.rosbag1", path, "ros").ReaderError,
-        import_extra("rosbags.rosbag2", path, "ros").ReaderError,
+        import_extra("rosbags.rosbag1", path, extra="ros").ReaderError,
+        import_extra("rosbags.rosbag2", path, extra="ros").ReaderError,
     )
     # ROS 2 before Iron leaves the definitions of messages out; these have been the same in all of its versions.
     known = typesys.get_typestore(typesys.Stores.LATEST)

@@ -98,13 +98,13 @@ def first_bytes(path: Path, count: int = 65536) -> bytes:
         return stream.read(count)
 
 
-def import_extra(name: str, path: Path, extra: str = "logs") -> ModuleType:
+def import_extra(name: str, path: Path, *, doing: str = "reading", extra: str = "logs") -> ModuleType:
     """A module of a package that only some formats need, or which extra installs it."""
     try:
         return importlib.import_module(name)
     except ModuleNotFoundError as error:
         package = name.partition(".")[0]
-        raise ModuleNotFoundError(f"{path.name}: reading it needs {package}: pip install 'altijax[{extra}]'") from error
+        raise ModuleNotFoundError(f"{path.name}: {doing} it needs {package}: pip install 'altijax[{extra}]'") from error
 
 
 def rotations_of(quaternions: np.ndarray) -> np.ndarray:

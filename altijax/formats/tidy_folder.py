@@ -2,6 +2,7 @@
 
 import gzip
 import io
+import math
 import tomllib
 import warnings
 import zlib
@@ -14,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 import pandas as pd
 
-from altijax.formats.quantities import COLUMNS, WHEELS
+from altijax.formats.quantities import COLUMNS, QUANTITIES, WHEELS, check_units
 from altijax.formats.stream_checks import RecordingError, check_overlap, clean_rows
 from altijax.formats.tables import Log
 from altijax.formats.text_tables import is_clock, layout_of, read_columns, seconds
@@ -25,10 +26,18 @@ _ENDINGS = (".csv", ".csv.gz", ".parquet")
 # Sizes that pulses and times of one wheel are filled up to: a town drive of ten minutes has some 10,000 pulses.
 _PULSES, _SPEEDS = 16384, 16384
 _SHEET: dict[str, dict[str, Any]] = {
-    "": {"name": str, "description": str, "axes": str, "wheel": dict, "site": dict, "source": dict},
+    "": {
+        "name": str,
+        "description": str,
+        "axes": str,
+        **dict.fromkeys(("wheel", "site", "units", "clock", "source", "saved"), dict),
+    },
     "wheel": {"pulses_per_turn": float, "radius": float, "track_width": float},
     "site": {"latitude": float, "height": float},
+    "units": dict.fromkeys(QUANTITIES, str),
+    "clock": dict.fromkeys(COLUMNS, float),
     "source": {"origin": str, "licence": str},
+    "saved": {"notes": list, "known": list},
 }
 
 
@@ -129,28 +138,40 @@ def _read_sheet(folder: Path, problems: list[str]) -> dict[str, Any]:
         sheet = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise RecordingError(f"recording.toml: {error}; correct that line") from error
+    check_sheet(sheet, "recording.toml", problems)
+    return sheet
+
+
+def check_sheet(sheet: Mapping[str, Any], origin: str, problems: list[str]) -> None:
+    """Raise for what a recording.toml cannot say, or whatever else stands for one; unknown entries are told."""
     for table, kinds in _SHEET.items():
         entries = sheet.get(table, {}) if table else sheet
         unknown = [key for key in entries if key not in kinds]
         if unknown:
             where = f" [{table}]" if table else ""
-            problems.append(f"recording.toml{where}: {', '.join(unknown)} ignored; known are {', '.join(kinds)}")
+            problems.append(f"{origin}{where}: {', '.join(unknown)} ignored; known are {', '.join(kinds)}")
         for key in entries.keys() & kinds.keys():
-            value = entries[key]
-            number = isinstance(value, int | float) and not isinstance(value, bool)
-            if not (number if kinds[key] is float else isinstance(value, kinds[key])):
-                kind = {float: "a number", str: "a text", dict: "a table"}[kinds[key]]
-                raise RecordingError(
-                    f"recording.toml, {table + '.' if table else ''}{key}: {value!r} is not {kind}; write one"
-                )
+            _check_entry(f"{origin}, {table + '.' if table else ''}{key}", entries[key], kinds[key])
     for key, value in sheet.get("wheel", {}).items():
         if key in _SHEET["wheel"] and value <= 0:
-            raise RecordingError(f"recording.toml, wheel.{key}: {value!r} is not positive; write what was measured")
+            raise RecordingError(f"{origin}, wheel.{key}: {value!r} is not positive; write what was measured")
     if abs(sheet.get("site", {}).get("latitude", 0)) > 90:
         raise RecordingError(
-            f"recording.toml, site.latitude: {sheet['site']['latitude']!r} is not a latitude in degrees"
+            f"{origin}, site.latitude: {sheet['site']['latitude']!r} is not a latitude in degrees, -90 to 90"
         )
-    return sheet
+    try:
+        check_units({key: unit for key, unit in sheet.get("units", {}).items() if key in QUANTITIES})
+    except ValueError as error:
+        raise RecordingError(f"{origin}, {error}") from error
+
+
+def _check_entry(place: str, value: Any, wanted: Any) -> None:
+    if wanted is not float:
+        if not isinstance(value, wanted):
+            kind = {str: "a text", dict: "a table", list: "a list"}[wanted]
+            raise RecordingError(f"{place}: {value!r} is not {kind}; write one")
+    elif not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+        raise RecordingError(f"{place}: {value!r} is not a number; write one, or leave out what is not known")
 
 
 def _read_table(path: Path, stream: str, problems: list[str]) -> pd.DataFrame:
@@ -158,15 +179,20 @@ def _read_table(path: Path, stream: str, problems: list[str]) -> pd.DataFrame:
         table = _read_parquet(path)
     else:
         table = _read_csv(path)
-    table.attrs["file"] = path.name
-    known = COLUMNS[stream]
     if "t" not in table.columns:
         seen = ", ".join(map(str, table.columns)) or "nothing"
         hint = "separate columns by commas" if len(table.columns) == 1 else "the first line must name the columns"
         raise RecordingError(f"{path.name}, line 1: there is no column t among {seen}; {hint}")
+    return known_columns(table, path.name, stream, problems)
+
+
+def known_columns(table: pd.DataFrame, file: str, stream: str, problems: list[str]) -> pd.DataFrame:
+    """The columns that a stream may have, as numbers; others are told, and what is no number raises."""
+    table.attrs["file"] = file
+    known = COLUMNS[stream]
     unknown = [str(column) for column in table.columns if column not in known]
     if unknown:
-        problems.append(f"{path.name}: unknown columns {', '.join(unknown)} ignored; known are {', '.join(known)}")
+        problems.append(f"{file}: unknown columns {', '.join(unknown)} ignored; known are {', '.join(known)}")
     table = table[[column for column in known if column in table.columns]]
     if is_clock(table["t"]):
         table = table.assign(t=seconds(table, "t", 1.0, problems))

@@ -111,3 +111,35 @@ def test_it_reads_as_a_table_and_says_when_it_harms() -> None:
     harmful = dataclasses.replace(FOUND, held_out=held_out_table([row]))
     said = "worse where they were not fitted: speed of 'drive' (0.5 to 0.7 m/s)"
     assert said in worse_where_held_out(harmful) and said in repr(harmful)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("value = 0.1", "value = nan", r"constants.accelerometer_bias_x.value is nan, which is no number"),
+        ("value = 0.1", "value = 'much'", r"is not a calibration that `Calibration.save` wrote: .*much"),
+        ("std = 1e-17", "std = -0.1", r"constants.accelerometer_bias_x.std is -0.1, and must be positive"),
+        (
+            "prior_std = 0.3",
+            "prior_std = 0.0",
+            r"constants.accelerometer_bias_x.prior_std is 0.0, and must be positive",
+        ),
+        ("mounting_pitch", "mounting_pich", r"constants has 'mounting_pich', known are wheel_scale, "),
+        ('method = "slope"', 'method = "steep"', r"method is 'steep', known are slope, shirai"),
+        ('unit = "m/s^2"', 'unit = "g"', r"constants.accelerometer_bias_x.unit is 'g', and it is in 'm/s\^2'"),
+        ("accelerometer_bias_x = [1.0, -0.7]", "accelerometer_bias_x = [1.0]", r"is not a calibration .*columns"),
+        ("accelerometer_bias_x = [1.0, -0.7]\n", "", r"correlation has rows \['mounting_pitch'\] and columns"),
+        ("[1.0, -0.7]", "[1.0, nan]", r"correlation has a value that is not between -1 and 1"),
+        ("[1.0, -0.7]", "[1.0, 0.7]", r"correlation is not symmetric with ones on its diagonal"),
+        ("[1.0, -0.7]", "[0.9, -0.7]", r"correlation is not symmetric with ones on its diagonal"),
+        ('"wheel_scale"', '"weal_scale"', r"absorbed has columns \['weal_scale'\], which are no constants"),
+    ],
+)
+def test_a_file_that_cannot_be_right_is_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    path = tmp_path / "car.toml"
+    FOUND.save(path)
+    text = path.read_text(encoding="utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    with pytest.raises(ValueError, match=message):
+        Calibration.load(path)

@@ -40,6 +40,17 @@ def test_csv_may_be_compressed_spaced_or_marked(tmp_path):
         pd.testing.assert_frame_equal(read_recording(folder).imu, expected, check_exact=True)
 
 
+def test_the_sheet_states_units_and_clock_and_the_call_overrides_it(tmp_path):
+    expected = read_recording(imu(tmp_path)).imu
+    imu(tmp_path, [ROWS[0], *(f"{100 * k},{0.01 * k:.2f},0.2,9.8" for k in range(50))])
+    (tmp_path / "recording.toml").write_text("[units]\ntime = 'ms'\n[clock]\nimu = 18.0\n")
+    stated = read_recording(tmp_path).imu
+    np.testing.assert_allclose(stated.index, expected.index + 18, rtol=1e-15)
+    over = read_recording(tmp_path, units={"time": "us", "accelerometer": "g"}).imu
+    np.testing.assert_allclose(over.index, expected.index / 1000 + 18, rtol=1e-15)
+    np.testing.assert_allclose(over["az"], 9.8 * 9.80665)
+
+
 def test_parquet_is_read_or_says_what_is_missing(tmp_path):
     if importlib.util.find_spec("pyarrow"):
         frame = pd.DataFrame({"ax": 0.0, "ay": 0.0, "az": 9.8}, index=pd.Index(np.arange(7) * 0.1, name="t"))
@@ -132,6 +143,11 @@ def test_unknown_columns_are_named_once_and_ignored(tmp_path):
         ("[wheel]\nradius = 0", r"recording.toml, wheel.radius: 0 is not positive"),
         ("[site]\nlatitude = 123.0", r"recording.toml, site.latitude: 123.0 is not a latitude"),
         ("[site]\nlatitude = true", r"recording.toml, site.latitude: True is not a number"),
+        ("[site]\nlatitude = nan", r"recording.toml, site.latitude: nan is not a number; .* or leave out what is not"),
+        ("[site]\nheight = inf", r"recording.toml, site.height: inf is not a number"),
+        ("[clock]\ngnss = 'late'", r"recording.toml, clock.gnss: 'late' is not a number"),
+        ("[units]\ngyro = 'rpm'", r"recording.toml, units: gyro has no unit 'rpm'; known are rad/s, deg/s"),
+        ("[units]\ngyro = 'deg/s'", r"recording.toml, units gives 'gyro' .* the recording has none of its columns"),
     ],
 )
 def test_a_bad_sheet_is_an_error(sheet, message, tmp_path):
