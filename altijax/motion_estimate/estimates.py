@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import jax
+import numpy as np
 import pandas as pd
 
+from altijax.calibration.priors import prior_of
 from altijax.calibration.records import Calibration, correct_imu
 from altijax.drives import imu_of
 from altijax.motion_estimate.batch import batch_estimate
+from altijax.motion_estimate.epoch_attitudes import epoch_estimate
 from altijax.motion_estimate.window import window_estimate
 from altijax.recordings import Recording
 from altijax.stages import stages
@@ -31,10 +34,11 @@ def estimate_motion(
     recording : Recording
         With an accelerometer and GNSS velocities; a gyro helps a lot.
     method : {"batch", "window", "epoch"}
-        "epoch" finds an attitude for each epoch by itself, level and along the course as far as the epoch does not
-        tell; it never uses the gyro. "window" lets epochs around share an attitude that turns as the gyro says.
-        "batch" is the most probable motion of the whole record, with biases, noise levels and delay from the record
-        itself, and the only one whose error bars include all of these.
+        "epoch" is the paper's: `fit_attitudes` finds an attitude for each epoch by itself, from Fourier means, level
+        and along the course as far as the epoch does not tell, and the previous one where it tells too little. It never
+        uses the gyro, and its bars presume a device that points about where it goes. "window" lets epochs around share
+        an attitude that turns as the gyro says. "batch" is the most probable motion of the whole record, with biases,
+        noise levels and delay from the record itself, and the only one whose error bars include all of these.
     calibration : Calibration, optional
         Constants known beforehand: biases and scales of accelerometers and gyros, `gnss_delay`. In "batch" they and
         their errors are the priors of what it estimates itself; a bias found from heights also holds the mounting, and
@@ -46,8 +50,8 @@ def estimate_motion(
         direction of travel, through the air or over ground. By itself: with a gyro it is free; without one it is held,
         and the wind is in it where the courses flown show one. Only "batch" knows wind.
     delay : float, optional
-        How late the stamps of the GNSS velocities are, in s; estimated by default ("epoch" cannot, and takes 0), in
-        "batch" with how much later still the vertical ones are.
+        How late the stamps of the GNSS velocities are, in s; estimated by default, in "batch" with how much later still
+        the vertical ones are. Where the record does not tell it, "epoch" takes what is presumed of receivers.
 
     Returns
     -------
@@ -66,13 +70,20 @@ def estimate_motion(
         raise ValueError(f"method must be one of {', '.join(MOTION_METHODS)}, got {method!r}")
     if wind not in (True, False, "auto"):
         raise ValueError(f'wind must be True, False or "auto", got {wind!r}')
-    use_gyro = use_gyro and method != "epoch" and "gx" in imu_of(recording)
+    use_gyro = use_gyro and "gx" in imu_of(recording)
     with jax.enable_x64(True), stages(f"motion of {recording.name} by {method}") as stage:
         if method == "batch":
             return batch_estimate(
                 recording, use_gyro=use_gyro, wind=wind, delay=delay, calibration=calibration, stage=stage
             )
-        if delay is None and calibration is not None and "gnss_delay" in calibration.values:
-            delay = float(calibration.values["gnss_delay"])
         corrected = replace(recording, imu=correct_imu(imu_of(recording), calibration))
-        return window_estimate(corrected, use_gyro=use_gyro, alone=method == "epoch", delay=delay, stage=stage)
+        calibrated = calibration is not None and "gnss_delay" in calibration.values
+        known, variance = prior_of(["gnss_delay"], calibration)
+        believed = float(known[0]), float(np.sqrt(variance[0, 0]))
+        if method == "epoch":
+            stage("delay of the GNSS velocities, attitudes of epochs")
+            given = (float(delay), 0.0) if delay is not None else believed if calibrated else None
+            return epoch_estimate(corrected, given, believed)
+        if delay is None and calibrated:
+            delay = believed[0]
+        return window_estimate(corrected, use_gyro=use_gyro, delay=delay, stage=stage)

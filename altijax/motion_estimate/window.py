@@ -28,10 +28,8 @@ _SHAKEN, _AWAY = 0.3, 0.3
 _UNKNOWN = 100.0  # m/s
 
 
-def window_estimate(
-    recording: Recording, *, use_gyro: bool, alone: bool, delay: float | None, stage: Stages
-) -> pd.DataFrame:
-    """What `altijax.estimate_motion` says by "window", or with each epoch `alone` by "epoch", of a corrected IMU."""
+def window_estimate(recording: Recording, *, use_gyro: bool, delay: float | None, stage: Stages) -> pd.DataFrame:
+    """What `altijax.estimate_motion` says by "window", of a corrected IMU; its arguments are described there."""
     search = delay is None and use_gyro
     first = float(USUAL_DELAY if search else delay or 0.0)
     readings = motion_readings(recording, use_gyro=use_gyro, delay=first)
@@ -42,7 +40,7 @@ def window_estimate(
     delay = float(delay or 0.0)
     stage("attitudes by windows of epochs")
     length = _WINDOW if use_gyro else _WINDOW_WITHOUT_GYRO
-    window = 1 if alone else epochs_within(length / float(readings.spacing))
+    window = epochs_within(length / float(readings.spacing))
     shared, covariance, _ = window_attitudes(readings, delay, _FREE if use_gyro else _COURSE_STD, window, gyro=use_gyro)
     stage("between the instants")
     return led(recording, readings, shared, covariance, delay, use_gyro=use_gyro)

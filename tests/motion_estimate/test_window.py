@@ -27,5 +27,7 @@ def test_readings_lead_better_than_straight_lines() -> None:
         name: np.interp(estimate.index, recording.gnss.index - estimate.attrs["delay"], recording.gnss[name])
         for name in ("v_e", "v_n")
     }
-    led, straight = (score_motion(e, recording).loc[["v_e", "v_n"], "rms"] for e in (estimate, estimate.assign(**lines)))
+    led, straight = (
+        score_motion(e, recording).loc[["v_e", "v_n"], "rms"] for e in (estimate, estimate.assign(**lines))
+    )
     assert led.max() < straight.max()
