@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from altijax.motion_estimate.estimates import estimate_motion
-from altijax.motion_estimate.scores import score_motion
 from tests.vehicle.made import short_drive
 
 
@@ -16,18 +15,3 @@ def test_velocities_meet_those_measured(use_gyro: bool) -> None:
     for name in ("v_e", "v_n", "v_u"):
         at = np.interp(epochs - 0.1, estimate.index, estimate[name])
         np.testing.assert_allclose(at, recording.gnss[name].loc[epochs], atol=0.1)
-
-
-def test_readings_lead_better_than_straight_lines() -> None:
-    """A quarter of what lines between the epochs miss, at the least."""
-    recording = short_drive()
-    inner = slice(recording.gnss.index[1], recording.gnss.index[-2])
-    estimate = estimate_motion(recording, method="window").loc[inner]
-    lines = {
-        name: np.interp(estimate.index, recording.gnss.index - estimate.attrs["delay"], recording.gnss[name])
-        for name in ("v_e", "v_n")
-    }
-    led, straight = (
-        score_motion(e, recording).loc[["v_e", "v_n"], "rms"] for e in (estimate, estimate.assign(**lines))
-    )
-    assert led.max() < straight.max()
