@@ -31,7 +31,7 @@ LEVELS = [
     ["speed_estimate.model"],
     ["speed_estimate.filter"],
     ["metrics"],
-    ["padding", "series", "programs", "inference.layout", "inference.levels"],
+    ["padding", "series", "programs", "speed_estimate.dead_reckoning", "inference.layout", "inference.levels"],
     ["stages", "formats.stream_checks", "motion_estimate.start"],
     ["formats.tables", "formats.quantities", "formats.ubx_frames", "calibration.records"],
     ["formats.text_tables", "formats.containers", "formats.ubx_solutions", "formats.ubx_ticks"],
