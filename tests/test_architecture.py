@@ -59,7 +59,7 @@ LEVELS = [
     ["elevation_estimate.priors"],
     ["motion_estimate.batch", "motion_estimate.window"],
     ["elevation_estimate.estimates", "motion_estimate.estimates", "speed_estimate.steps"],
-    ["elevation_estimate.calibration", "motion_estimate.scores", "speed_estimate.estimates"],
+    ["streaming", "elevation_estimate.calibration", "motion_estimate.scores", "speed_estimate.estimates"],
     ["samples.make_hill_road", "samples.hilly_drives", "samples.foreign_drives"],
     ["speed_estimate.outages", "speed_estimate.calibration", "motion_estimate.calibration"],
     ["estimates"],
