@@ -244,6 +244,18 @@ from .strapdown import (
     integrate_position as integrate_position,
     integrate_velocity as integrate_velocity,
 )
+from .streaming import (
+    FilterSample as FilterSample,
+    FilterState as FilterState,
+    LoopSample as LoopSample,
+    LoopState as LoopState,
+    filter_start as filter_start,
+    filter_step as filter_step,
+    speed_start as speed_start,
+    speed_step as speed_step,
+    state_from_dict as state_from_dict,
+    state_to_dict as state_to_dict,
+)
 from .tables import (
     recording_from_tables as recording_from_tables,
     save_estimate as save_estimate,

@@ -17,7 +17,8 @@ from altijax.calibration.priors import PARAMETERS
 from altijax.calibration.records import Calibration, constants_table, held_out_row, held_out_table
 from altijax.calibration.reference_fit import Found, ReferenceFit, calibration_from, fit_to_reference, weighted_fit
 from altijax.drives import imu_of
-from altijax.motion_estimate.estimates import batch_with_constants, estimate_motion
+from altijax.motion_estimate.batch import batch_with_constants
+from altijax.motion_estimate.estimates import estimate_motion
 from altijax.motion_estimate.scores import estimate_at
 from altijax.recordings import Recording
 

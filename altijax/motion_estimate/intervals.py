@@ -5,7 +5,31 @@ from dataclasses import dataclass
 import jax
 import jax.numpy as jnp
 
-from altijax.motion_estimate.model import Intervals
+
+@jax.tree_util.register_dataclass
+@dataclass(frozen=True, kw_only=True)
+class Intervals:
+    """Readings between the instants.
+
+    Attributes
+    ----------
+    f_b : (intervals, steps, 3) m/s^2
+        Mean specific force of equal steps.
+    w_b : (intervals, steps, 3) rad/s
+        Mean angular rate of the same; zero without a gyro.
+    dt : (intervals, steps) s
+        Length of each step; zero where steps only fill an interval up.
+    duration : (intervals,) s
+        Length of each interval.
+    gap : (intervals,) s
+        How much of it no reading supports.
+    """
+
+    f_b: jax.Array
+    w_b: jax.Array
+    dt: jax.Array
+    duration: jax.Array
+    gap: jax.Array
 
 
 @jax.tree_util.register_dataclass

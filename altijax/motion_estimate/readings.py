@@ -46,20 +46,7 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longe
     usual = float(np.median(np.diff(t)))
     gyro = imu[_GYRO].to_numpy(float) if use_gyro else np.zeros((t.size, 3))
     readings = np.concatenate([imu[_ACCELEROMETER].to_numpy(float), gyro], -1)
-    found = gnss_velocities(recording)
-    if found is None:
-        raise ValueError(
-            f"recording {recording.name!r} has no GNSS velocities, which estimate_motion needs (wheel speeds have no "
-            "direction): add a gnss.csv with v_e, v_n or speed, course"
-        )
-    epochs, velocity, std = found
-    inside = (epochs - delay >= 0) & (epochs - delay <= t[-1])
-    if inside.sum() < 3:
-        raise ValueError(
-            f"recording {recording.name!r}: {inside.sum()} GNSS velocities lie within the time of the IMU and 3 are "
-            "needed; are the streams on one clock?"
-        )
-    epochs, velocity, std = epochs[inside], velocity[inside], std[inside]
+    epochs, velocity, std = velocities_within(recording, delay)
     spacing = float(np.clip(np.median(np.diff(epochs)), usual, 1.0))
     instant, row = _with_instants_between(epochs, t[-1] + delay, delay, min(spacing, longest))
     delayed = np.ones(instant.size)
@@ -82,6 +69,43 @@ def motion_readings(recording: Recording, *, use_gyro: bool, delay: float, longe
         gravity=np.float64(gravity_at(recording)),
     )
     return MotionReadings(**arrays)
+
+
+def velocities_within(recording: Recording, delay: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """GNSS velocities that lie within the time of the IMU.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an IMU and GNSS velocities.
+    delay : float
+        How late the receiver's stamps are, s.
+
+    Returns
+    -------
+    t, velocity, std : ndarray
+        As of `gnss_velocities`; the times as stamped.
+
+    Raises
+    ------
+    ValueError
+        If there are none, or fewer than 3 lie within the time of the IMU.
+    """
+    last = imu_of(recording).index[-1] - start_of(recording)
+    found = gnss_velocities(recording)
+    if found is None:
+        raise ValueError(
+            f"recording {recording.name!r} has no GNSS velocities, which estimate_motion needs (wheel speeds have no "
+            "direction): add a gnss.csv with v_e, v_n or speed, course"
+        )
+    epochs, velocity, std = found
+    inside = (epochs - delay >= 0) & (epochs - delay <= last)
+    if inside.sum() < 3:
+        raise ValueError(
+            f"recording {recording.name!r}: {inside.sum()} GNSS velocities lie within the time of the IMU and 3 are "
+            "needed; are the streams on one clock?"
+        )
+    return epochs[inside], velocity[inside], std[inside]
 
 
 def summed_readings(t: np.ndarray, usual: float, readings: np.ndarray) -> dict[str, np.ndarray]:

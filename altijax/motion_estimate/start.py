@@ -1,14 +1,13 @@
 """Attitudes of a record from windows of its epochs: what a whole-record fit starts from, and an estimate of its own."""
 
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 import jax
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from altijax.motion_estimate.intervals import MotionReadings, instants_at, intervals_between
-from altijax.motion_estimate.model import Intervals, Trajectory
+from altijax.motion_estimate.intervals import Intervals, MotionReadings, instants_at, intervals_between
 from altijax.motion_estimate.preintegration import relative_attitudes
 from altijax.series import interpolated
 from altijax.wahba import fit_windows
@@ -28,6 +27,22 @@ quick_jit = partial(jax.jit, compiler_options={"xla_cpu_use_fusion_emitters": Fa
 _fit_windows = quick_jit(fit_windows)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Attitudes:
+    """Attitudes and velocities at the instants of a record.
+
+    Attributes
+    ----------
+    C_nb : (time, 3, 3)
+        Attitude.
+    v_n : (time, 3) m/s
+        Velocity, East, North and up.
+    """
+
+    C_nb: np.ndarray
+    v_n: np.ndarray
+
+
 @quick_jit
 def _turned_intervals(readings: MotionReadings, delay: jax.Array) -> tuple[jax.Array, Intervals, jax.Array]:
     """The instants, the readings between them, and how the gyro turns from the beginning of each interval."""
@@ -38,7 +53,7 @@ def _turned_intervals(readings: MotionReadings, delay: jax.Array) -> tuple[jax.A
 
 def window_attitudes(
     readings: MotionReadings, delay: float, prior_std: float, window: int, *, gyro: bool
-) -> tuple[Trajectory, np.ndarray, float]:
+) -> tuple[Attitudes, np.ndarray, float]:
     """Attitude at each instant from the epochs around it, level and along the direction of travel beforehand.
 
     Parameters
@@ -56,8 +71,8 @@ def window_attitudes(
 
     Returns
     -------
-    trajectory : Trajectory
-        Attitudes, and the measured velocities joined by straight lines, led on by the readings; biases are zero.
+    attitudes : Attitudes
+        Attitudes, and the measured velocities joined by straight lines, led on by the readings.
     covariance : (time, 3, 3) rad^2
         Of the attitude, a rotation vector in navigation axes.
     misfit : float
@@ -93,22 +108,14 @@ def window_attitudes(
     # Beyond the measured velocities the readings lead on.
     gained = (np.einsum("kij,kj->ki", shared.C_nb, f_b) - upward) * intervals.duration[:, None]
     beyond = np.concatenate([np.zeros((1, 3)), np.cumsum(np.where(between[:, None], 0, gained), 0)])
-    zero = np.zeros_like(v)
     C_nb = _at_instants(shared.C_nb, half, end, intervals.duration, gyro=gyro)
     # Instants that only fill up stay as the last one is: a pass spends no time on them.
     last = np.flatnonzero(intervals.duration > 0)[-1] + 1
     C_nb[last:] = C_nb[last]
-    states: dict[str, Any] = dict(
-        C_nb=C_nb,
-        v_n=v + beyond - beyond[np.argmax(np.isfinite(std[:, 0]))],
-        accelerometer_bias=zero,
-        gyro_bias=zero,
-        slip=zero[:, :2],
-        constants=np.zeros(8),
-    )
+    v_n = v + beyond - beyond[np.argmax(np.isfinite(std[:, 0]))]
     covariance = np.concatenate([shared.covariance[:1], shared.covariance])
     misfit = np.sum(whole * shared.misfit**2) / max(np.sum(whole), 1)
-    return Trajectory(**states), covariance, float(misfit)
+    return Attitudes(C_nb=C_nb, v_n=v_n), covariance, float(misfit)
 
 
 def _at_instants(

@@ -31,6 +31,7 @@ from altijax.speed_estimate.estimates import (
     NOMINAL_NOISE,
     dead_reckon,
     fit_noise,
+    known_at,
     on_imu,
     run_filter,
     samples_between,
@@ -399,7 +400,7 @@ def _outages(
             run = run_filter(drive, start, AUTO_SENSORS, initial, NOMINAL_NOISE, start + OUTAGE, run)
             estimate = on_imu(outage, run, samples_between(outage, start, start + OUTAGE))
             if method != "filter":
-                dead_reckon(estimate, outage, run, start, method)
+                dead_reckon(estimate, outage, known_at(outage, run, start), method)
             times = start + np.arange(0.5, OUTAGE + 0.1, 0.5)
             truth, near = _at(reference, times)
             errors[kind, start] = (np.interp(times, estimate.index, estimate["speed"]) - truth)[near]

@@ -13,7 +13,6 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pandas as pd
-from jax.typing import ArrayLike
 from scipy.optimize import minimize
 
 from altijax.calibration.records import Calibration
@@ -21,7 +20,7 @@ from altijax.drives import imu_of, start_of
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
 from altijax.series import interpolated
-from altijax.speed import speed_error_growth, speed_with_aided_roll, speed_with_roll, speed_without_roll
+from altijax.speed_estimate.dead_reckoning import Start, reckon
 from altijax.speed_estimate.filter import MARGIN, SpeedState, filter_speed, first_state
 from altijax.speed_estimate.model import SENSORS, SpeedNoise, state_names
 from altijax.speed_estimate.steps import STEP, SpeedDrive, drive_in_steps, initial_state, steps_until
@@ -72,7 +71,8 @@ def estimate_speed(
         With accelerometer and gyro, and wheel speeds or else GNSS velocities as aid.
     method : {"filter", "conventional", "roll", "aided"}
         "conventional" neglects the roll, "roll" is the loop of [us20060293826]_, "aided" the same with the last
-        aided speed held inside the roll angle; "filter" is `filter_speed`. Up to `aid_until` all are the filter.
+        aided speed held inside the roll angle; "filter" is `filter_speed`. Up to `aid_until` all are the filter, but
+        where there is no aid and both initial values are given: then the others begin exactly there.
     aid_until : float, optional
         Last time, on the recording's time axis, whose aid may be used; by default the first second of the IMU, which
         gives the initial speed and pitch and next to nothing of the constants.
@@ -104,14 +104,22 @@ def estimate_speed(
         drive = drive_in_steps(recording, calibration, until)
         sensors = AUTO_SENSORS if sensors == "auto" else sensors
         initial = initial_state(drive, until, initial_speed, initial_pitch)
-        stage("noise levels")
-        noise = fit_noise(drive, until, sensors, initial, NOMINAL_NOISE)
-        stage("filter")
-        run = run_filter(drive, until, sensors, initial, noise)
-        estimate = on_imu(drive, run)
-        if method != "filter":
+        aided = bool(np.any((drive.t_aid >= 0) & (drive.stamp_aid <= until)))
+        if method == "filter" or aided or initial_speed is None or initial_pitch is None:
+            stage("noise levels")
+            noise = fit_noise(drive, until, sensors, initial, NOMINAL_NOISE)
+            stage("filter")
+            run = run_filter(drive, until, sensors, initial, noise)
+            estimate = on_imu(drive, run)
+            known = known_at(drive, run, until) if method != "filter" else None
+        else:
+            # There is nothing to filter: dead reckoning begins exactly where it was told to.
+            estimate = pd.DataFrame(0.0, index=drive.t, columns=["speed", "speed_std", "pitch", "roll"])
+            estimate["valid"] = True
+            known = known_beforehand(drive, initial, sensors)
+        if known is not None:
             stage("dead reckoning")
-            dead_reckon(estimate, drive, run, until, method)
+            dead_reckon(estimate, drive, known, method)
         gap = np.diff(drive.t, prepend=drive.t[0]) > max(5 * drive.usual, 0.1)
         estimate["valid"] &= ~gap
         estimate.index = imu_of(recording).index
@@ -299,10 +307,40 @@ def on_imu(drive: SpeedDrive, run: FilterRun, rows: slice = slice(None)) -> pd.D
     return pd.DataFrame(columns, index=t).assign(valid=True)
 
 
-def dead_reckon(estimate: pd.DataFrame, drive: SpeedDrive, run: FilterRun, until: float, method: str) -> None:
-    """Write over the rows after the aid what a method without a filter makes of the same constants."""
+@dataclass(frozen=True, kw_only=True)
+class Known:
+    """What dead reckoning begins with: when, in s from the first sample, and the filter's states there."""
+
+    begin: float
+    sensors: str
+    noise: dict[str, float]
+    start: Start
+
+
+def known_at(drive: SpeedDrive, run: FilterRun, until: float) -> Known:
+    """What the filter knew at the last step up to a time."""
     last = int(np.clip(np.searchsorted(drive.ends, until, side="right") - 1, 0, drive.ends.size - 1))
-    begin, end = drive.ends[last], drive.t[-1]
+    part = last // _PART
+    inputs, counted = next(_parts(run.inputs, last + 1, part))
+    levels = _bank(run.sensors, run.noise)
+    bank, _, track = _go_on(run.starts[part], inputs, counted, np.float64(drive.gravity), levels, run.sensors)
+    state = jax.tree.map(lambda x: np.asarray(x)[0], bank)
+    speed, roll = (np.asarray(track[name])[counted][-1] for name in ("speed", "roll"))
+    start = Start(speed=speed, roll=roll, states=state.states, covariance=state.covariance)
+    return Known(begin=float(drive.ends[last]), sensors=run.sensors, noise=run.noise, start=start)
+
+
+def known_beforehand(drive: SpeedDrive, initial: tuple[float, float], sensors: str) -> Known:
+    """What the filter is told of the first sample."""
+    first = jax.tree.map(lambda x: x[0], _before_the_first(drive, initial, sensors))
+    roll = first.states[state_names(sensors).index("roll")]
+    start = Start(speed=np.float64(initial[0]), roll=roll, states=first.states, covariance=first.covariance)
+    return Known(begin=0.0, sensors=sensors, noise=NOMINAL_NOISE, start=start)
+
+
+def dead_reckon(estimate: pd.DataFrame, drive: SpeedDrive, known: Known, method: str) -> None:
+    """Write over the rows after the aid what a method without a filter makes of the same constants."""
+    begin, end = known.begin, drive.t[-1]
     intervals = round((end - begin) / drive.usual)
     if intervals < 1:
         return
@@ -310,50 +348,17 @@ def dead_reckon(estimate: pd.DataFrame, drive: SpeedDrive, run: FilterRun, until
     # no further than there are rows
     count = min(intervals, int(np.ceil((estimate.index[-1] - begin) / dt))) + 1
     t = begin + dt * np.arange(count)
-    first, track = run.track(last)
-    names = state_names(run.sensors)
-    state = dict(zip(names, track["states"][last - first], strict=True))
-    std = dict(zip(names, track["states_std"][last - first], strict=True))
-    f, w = (interpolated(t, drive.t, series) for series in (drive.f_b, drive.w_b))
-    f_x, f_y = f[:, 0] - state["accelerometer_bias_x"], f[:, 1] - state["accelerometer_bias_y"]
-    w_y = w[:, 1] - state["gyro_bias_y"] - state["rectification_y"] * np.interp(t, drive.ends, drive.vibration)
-    w_z = w[:, 2] - state["gyro_bias_z"]
-    # along and across the direction of travel
-    along, across = np.cos(state["travel_yaw"]), np.sin(state["travel_yaw"])
-    f_x, f_y = along * f_x + across * f_y, along * f_y - across * f_x
-    pitch, roll = track["pitch"][last - first], track["roll"][last - first]
-    pitch0 = np.arcsin(np.clip(along * np.sin(pitch) + across * np.cos(pitch) * np.sin(roll), -1, 1))
-    speed0 = track["speed"][last - first]
     size = bucket(count, _SAMPLES)
-    filled = [padded(x, size) for x in (f_x, f_y, w_y, w_z)]
-    start = speed0, pitch0, np.float64(drive.gravity), dt
-    # roll and where one explains the readings, if the method asks for it
-    rest: tuple[ArrayLike, ArrayLike] = np.zeros(size), np.ones(size, bool)
-    growth, response = np.ones(count), t - begin
-    if method == "conventional":
-        speed, pitches = speed_without_roll(filled[0], filled[2], *start)
-    elif method == "roll":
-        speed, pitches, *rest = speed_with_roll(*filled, *start)
-        growth, response = (np.asarray(x)[:count] for x in speed_error_growth(filled[3], dt))
-    else:
-        speed, pitches, *rest = speed_with_aided_roll(*filled, np.full(size, speed0), np.ones(size), *start)
-    found = {"speed": speed, "pitch": pitches, "roll": rest[0], "valid": rest[1]}
-    found = {name: np.asarray(values)[:count] for name, values in found.items()}
-    g, span = drive.gravity, t - begin
-    acceleration = g * std["pitch"]
-    turned = np.cumsum(np.abs(w_z)) * dt
-    variance = (
-        (growth * std["speed"]) ** 2
-        + (response * acceleration) ** 2
-        + (g * std["gyro_bias_y"] * response * span / 2) ** 2
-        + run.noise["acceleration"] ** 2 * span
-        + (g * run.noise["rotation"]) ** 2 * response**2 * span / 3
-        + (g * run.noise["road_roll"] * turned * response / 2) ** 2
-    )
-    later = estimate.index > begin
+    f_b, w_b = (padded(interpolated(t, drive.t, series), size) for series in (drive.f_b, drive.w_b))
+    vibration = padded(np.interp(t, drive.ends, drive.vibration), size)
+    noise = SpeedNoise(**{name: np.float64(level) for name, level in known.noise.items()})
+    names = state_names(known.sensors)
+    found = reckon(method, names, known.start, f_b, w_b, vibration, np.float64(drive.gravity), dt, noise, STEP)
+    series = {name: np.asarray(getattr(found, name))[:count] for name in ("speed", "std", "pitch", "roll", "valid")}
+    later = estimate.index >= begin
     times = estimate.index[later].to_numpy()
-    columns = {"speed": np.maximum(found["speed"], 0), "speed_std": np.sqrt(variance)}
-    columns |= {"pitch": found["pitch"], "roll": found["roll"]}
+    columns = {"speed": np.maximum(series["speed"], 0), "speed_std": series["std"]}
+    columns |= {"pitch": series["pitch"], "roll": series["roll"]}
     for name, values in columns.items():
         estimate.loc[later, name] = np.interp(times, t, values)
-    estimate.loc[later, "valid"] = found["valid"][np.clip(np.rint((times - begin) / dt), 0, count - 1).astype(int)]
+    estimate.loc[later, "valid"] = series["valid"][np.clip(np.rint((times - begin) / dt), 0, count - 1).astype(int)]

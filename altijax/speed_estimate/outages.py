@@ -14,12 +14,13 @@ from altijax.speed_estimate.estimates import (
     NOMINAL_NOISE,
     dead_reckon,
     fit_noise,
+    known_at,
     on_imu,
     require_options,
     run_filter,
     samples_between,
 )
-from altijax.speed_estimate.steps import STEP, SpeedDrive, drive_in_steps, initial_state, speed_of
+from altijax.speed_estimate.steps import STEP, SpeedDrive, drive_in_steps, from_first_aid, initial_state, speed_of
 from altijax.stages import tracked
 
 # The noise levels are fitted again each time the aid has gone on for half as long again.
@@ -48,7 +49,8 @@ def outage_table(
     every : float
         Time between the starts of outages, in s.
     first : float, optional
-        Time before the first one, in s, in which the constants can be learned.
+        Time before the first one, in s, in which the constants can be learned; counted from the first aid where that
+        comes later than a second.
 
     Returns
     -------
@@ -114,6 +116,7 @@ def outage_errors(
     split = [(name, *name.partition(":")[::2]) for name in methods]
     for _, method, sensors in split:
         require_options(method, sensors or "auto")
+    recording = from_first_aid(recording)
     with jax.enable_x64(True):
         drive = drive_in_steps(recording, None, first)
         t_truth, truth = _truth(recording, drive)
@@ -138,7 +141,7 @@ def outage_errors(
                 estimate = filtered
                 if method != "filter":
                     estimate = filtered.copy()
-                    dead_reckon(estimate, drive, run, start, method)
+                    dead_reckon(estimate, drive, known_at(drive, run, start), method)
                 for duration in durations:
                     end = start + duration
                     if end <= last:

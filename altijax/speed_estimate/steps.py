@@ -102,6 +102,34 @@ def _states_covariance(calibration: Calibration | None, delay: str) -> np.ndarra
     return covariance
 
 
+def from_first_aid(recording: Recording) -> Recording:
+    """The recording from when its speed is known: where the first aid comes later than a second, from there on.
+
+    Parameters
+    ----------
+    recording : Recording
+        With an IMU.
+
+    Returns
+    -------
+    recording : Recording
+        The same but for its IMU.
+
+    Raises
+    ------
+    ValueError
+        If no aid lies within the time of the IMU.
+    """
+    imu, (t_aid, _) = imu_of(recording), aid_of(recording)
+    t_aid = t_aid[(t_aid >= imu.index[0]) & (t_aid <= imu.index[-1])]
+    if not t_aid.size:
+        raise ValueError(
+            f"recording {recording.name!r} has no wheel or GNSS speed within the time of its IMU; are the streams on "
+            "one clock?"
+        )
+    return recording if t_aid[0] <= imu.index[0] + 1.0 else replace(recording, imu=imu[t_aid[0] :])
+
+
 def aid_of(recording: Recording) -> tuple[np.ndarray, np.ndarray]:
     if recording.wheel is not None:
         speed = recording.wheel["speed"].dropna()

@@ -1,5 +1,6 @@
 """The motion at every IMU sample from that at the instants: led there by the readings, with its errors."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +12,14 @@ from altijax.drives import imu_of, start_of
 from altijax.inference.layout import Layout
 from altijax.recordings import Recording
 from altijax.vehicle.between import Between
-from altijax.vehicle.inertial import MOVING
-from altijax.vehicle.smoother import Fit
+from altijax.vehicle.inertial import MOVING, ROTATION, Trajectory
 
 _VELOCITY, _POSITION = ("v_e", "v_n", "v_u"), ("east", "north", "height")
+MOTION_COLUMNS = tuple(
+    f"{name}{end}" for end in ("", "_std") for name in ("roll", "pitch", "heading", "v_e", "v_n", "v_u")
+)
+"""Columns of attitude and velocity of `as_table`, and their standard deviations."""
+
 # Where the pitch is steeper than this cosine, roll and heading are one angle.
 _UPRIGHT = 0.05
 
@@ -45,7 +50,14 @@ class Samples:
     covariance: np.ndarray
 
 
-def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between, levels: dict[str, float]) -> Samples:
+def at_samples(
+    recording: Recording,
+    layout: Layout,
+    trajectory: Trajectory,
+    covariance: Any,
+    between: Between,
+    levels: Mapping[str, float],
+) -> Samples:
     """The motion at every IMU sample.
 
     Parameters
@@ -54,11 +66,13 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
         With an IMU.
     layout : Layout
         Of the states.
-    fit : Fit
-        Trajectory and covariance at the instants.
+    trajectory : Trajectory
+        States at the instants.
+    covariance : (time, states, states)
+        Of their errors.
     between : Between
         What the readings say between them, about the same trajectory.
-    levels : dict of str to float
+    levels : mapping of str to float
         Noise levels.
 
     Returns
@@ -67,7 +81,7 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
         Times beyond the instants have the motion of the nearest one.
     """
     t = imu_of(recording).index.to_numpy(float) - start_of(recording)
-    x = layout.split(np.asarray(fit.trajectory.x))
+    x = layout.split(np.asarray(trajectory.x))
     knots = np.append(between.instants[0], between.t.ravel())
     kept = np.append(True, np.diff(np.maximum.accumulate(knots)) > 1e-9)
     knots = knots[kept]
@@ -76,7 +90,7 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
         return np.concatenate([first[:1], later.reshape(-1, *first.shape[1:])])[kept]
 
     inside = np.clip(t, knots[0], knots[-1])
-    C_nb = Slerp(knots, Rotation.from_matrix(along(fit.trajectory.C_nb, between.C_nb)))(inside).as_matrix()
+    C_nb = Slerp(knots, Rotation.from_matrix(along(trajectory.C_nb, between.C_nb)))(inside).as_matrix()
     series = {"velocity": between.v_n, "position": between.p_n}
     v_n, p_n = (
         np.stack([np.interp(inside, knots, column) for column in along(np.asarray(x[name]), fine).T], -1)
@@ -85,7 +99,7 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
     way = np.interp(inside, knots, along(np.asarray(x["way"]), between.way))
     turning = np.gradient(C_nb, t, axis=0) @ np.swapaxes(C_nb, -1, -2)
     rate = np.stack([turning[:, 2, 1], turning[:, 0, 2], turning[:, 1, 0]], -1)
-    P = _covariance(inside, layout, fit, between, levels)
+    P = _covariance(inside, layout, np.asarray(covariance), between, levels)
     if "antenna" in layout:
         arm = np.einsum("tij,j->ti", C_nb, np.asarray(x["antenna"])[-1])
         around = np.cross(rate, arm)
@@ -103,18 +117,20 @@ def at_samples(recording: Recording, layout: Layout, fit: Fit, between: Between,
     return Samples(t=t, C_nb=C_nb, v_n=v_n, p_n=p_n, way=way, covariance=P)
 
 
-def _covariance(t: np.ndarray, layout: Layout, fit: Fit, between: Between, levels: dict[str, float]) -> np.ndarray:
+def _covariance(
+    t: np.ndarray, layout: Layout, covariance: np.ndarray, between: Between, levels: Mapping[str, float]
+) -> np.ndarray:
     named = (*MOVING, "antenna") if "antenna" in layout else MOVING
     moving = np.concatenate([np.arange(layout.size)[layout.at(name)] for name in named])
     distinct = np.append(True, np.diff(between.instants) > 1e-9)
-    nodes, P = between.instants[distinct], np.asarray(fit.covariance)[distinct][:, moving[:, None], moving]
+    nodes, P = between.instants[distinct], covariance[distinct][:, moving[:, None], moving]
     k = np.clip(np.searchsorted(nodes, t, side="right") - 1, 0, nodes.size - 2)
     dt = nodes[k + 1] - nodes[k]
     s = (t - nodes[k]) / dt
     P = (1 - s)[:, None, None] * P[k] + s[:, None, None] * P[k + 1]
     # Between two known ends a random walk has the variance s (1 - s) dt.
     bridge = s * (1 - s) * dt
-    turned = levels["rotation"] ** 2 * bridge
+    turned = max(levels[name] for name in ROTATION if name in levels) ** 2 * bridge
     force = np.linalg.norm(between.gained[np.flatnonzero(distinct)[k], 3:6], axis=-1)
     shaken = levels["acceleration"] ** 2 * bridge + turned * force**2 / 12
     P[:, range(3), range(3)] += turned[:, None]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from altijax.calibration.priors import prior_of
 from altijax.calibration.records import Calibration
 from altijax.vehicle.parts import Part
 from altijax.vehicle.sensors import Use, layout_of, parts_of
@@ -22,6 +23,7 @@ _STATES: dict[str, tuple[str, int, bool]] = {
     "wheel_delay": ("wheel_delay", 0, False),
     "wheel_scale": ("wheel_scale", 0, True),
 }
+_FORCE_SCALES = {f"accelerometer_scale_{axis}" for axis in _AXES}
 
 
 def belief_of(use: Use, calibration: Calibration | None = None) -> Belief:
@@ -48,21 +50,30 @@ def belief_of(use: Use, calibration: Calibration | None = None) -> Belief:
     covariance: Any = np.diag(np.square(std))
     if calibration is None:
         return Belief(mean=mean, covariance=covariance)
-    found = {
+    # What the states are by the constants; all that the calibrated ones absorbed counts, be it a state here or not.
+    places = {
         name: layout.at(state).start + entry
         for name, (state, entry, _) in _STATES.items()
-        if name in calibration.values and state in layout
+        if state in layout and not parts[state].time
     }
-    if not found:
-        return Belief(mean=mean, covariance=covariance)
-    names, places = list(found), np.array(list(found.values()))
-    inverse = np.array([_STATES[name][2] for name in names])
-    value = calibration.values[names].to_numpy(float)
-    slope = np.where(inverse, -1 / np.where(inverse, value, 1.0) ** 2, 1.0)
-    known = calibration.std_with_absorbed[names].to_numpy(float) * slope
-    mean[places] = np.where(inverse, 1 / np.where(inverse, value, 1.0) - 1, value)
-    correlation = calibration.correlation.loc[names, names].to_numpy(float)
-    covariance[places[:, None], places] = correlation * np.outer(known, known)
+    calibrated = [name for name in places if name in calibration.values]
+    names = [*places, *(name for name in map(str, calibration.absorbed) if name not in places)]
+    common = "accelerometer_scale" in calibration.values
+    names += ["accelerometer_scale"] * (common and "accelerometer_scale" not in names)
+    spreads = {name: float(std[place]) for name, place in places.items()}
+    known, errors = prior_of(names, calibration, spreads)
+    value = dict(zip(names, known.tolist(), strict=True))
+    J = np.zeros((len(std), len(names)))
+    for name, place in places.items():
+        scale = _STATES[name][2]
+        whole = value[name] * (value["accelerometer_scale"] if common and name in _FORCE_SCALES else 1.0)
+        J[place, names.index(name)] = -1 / (whole * value[name]) if scale else 1.0
+        if common and name in _FORCE_SCALES:
+            J[place, names.index("accelerometer_scale")] = -1 / (whole * value["accelerometer_scale"])
+        if name in calibrated or (common and name in _FORCE_SCALES):
+            mean[place] = 1 / whole - 1 if scale else value[name]
+    at = np.array(list(places.values()))
+    covariance[at[:, None], at] = (J @ errors @ J.T)[at[:, None], at]
     return Belief(mean=mean, covariance=covariance)
 
 

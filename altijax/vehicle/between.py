@@ -9,7 +9,7 @@ import numpy as np
 
 from altijax import _safe
 from altijax.inference.layout import Layout
-from altijax.motion_estimate.model import Intervals
+from altijax.motion_estimate.intervals import Intervals
 from altijax.motion_estimate.preintegration import Preintegrated, preintegrate, relative_attitudes
 from altijax.rotations import matrix_to_rotvec
 from altijax.vehicle.inertial import Trajectory

@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import jax
 import numpy as np
@@ -101,16 +102,23 @@ def estimate_drive(
         search = smoothed(turned, sources, calibration, heights, stage)
         stage("between the instants")
         said = said_between(search)
-        samples = at_samples(turned, layout_of(search.use), fit_of(search), said, search.levels)
+        fit = fit_of(search)
+        layout = layout_of(search.use)
+        samples = at_samples(turned, layout, fit.trajectory, fit.covariance, said, search.levels)
     samples = replace(samples, C_nb=samples.C_nb @ mounting.as_matrix())
     estimate = as_table(recording, samples).assign(
         **_elevation(search, said, samples), **_places(recording, search, samples)
     )
-    estimate["valid"] = _supported(recording, sources)
+    estimate["valid"] = supported(recording, sources)
     estimate.attrs.update(summary(search, start))
-    if estimate.attrs["verdict"] != CONSISTENT:
-        warnings.warn(f"recording {recording.name!r}: {estimate.attrs['verdict']}", stacklevel=2)
+    warn_of(recording, estimate)
     return estimate
+
+
+def warn_of(recording: Recording, estimate: pd.DataFrame) -> None:
+    """Warn where measurements contradict each other: the caller's caller is who asked."""
+    if estimate.attrs["verdict"] != CONSISTENT:
+        warnings.warn(f"recording {recording.name!r}: {estimate.attrs['verdict']}", stacklevel=3)
 
 
 def use_of(recording: Recording, use: Iterable[str] | None) -> Use:
@@ -166,18 +174,22 @@ def smoothed(
     belief = belief_of(use, calibration)
     if heights:
         belief.mean[layout_of(use).at("datum")] = heights[0][1]
-    if calibration is not None and "gnss_delay" in calibration.values:
-        delays: tuple[float, ...] = (float(calibration.values["gnss_delay"]),)
-    elif "velocity" not in use:
-        delays = (0.0,)
-    elif "gyro" in use:
-        stage("delay of the GNSS velocities")
-        found = receiver_delay(recording)
-        delays = (found, USUAL_DELAY) if abs(found - USUAL_DELAY) > _DOUBTFUL else (found,)
-    else:
-        delays = _DELAYS
+    delays = delays_of(recording, use, calibration, stage)
     stage("first trajectory")
     return likely(best_start(recording, use, delays, belief, heights), stage)
+
+
+def delays_of(recording: Recording, use: Use, calibration: Calibration | None, stage: Stages) -> tuple[float, ...]:
+    """Delays of the receiver to start from, s."""
+    if calibration is not None and "gnss_delay" in calibration.values:
+        return (float(calibration.values["gnss_delay"]),)
+    if "velocity" not in use:
+        return (0.0,)
+    if "gyro" not in use:
+        return _DELAYS
+    stage("delay of the GNSS velocities")
+    found = receiver_delay(recording)
+    return (found, USUAL_DELAY) if abs(found - USUAL_DELAY) > _DOUBTFUL else (found,)
 
 
 def _mounting(recording: Recording, sources: Use) -> Rotation:
@@ -235,7 +247,7 @@ def _places(recording: Recording, search: Search, samples: Samples) -> dict[str,
     return {"lat": np.asarray(lat), "lon": np.asarray(lon)}
 
 
-def _supported(recording: Recording, sources: Use) -> np.ndarray:
+def supported(recording: Recording, sources: Use) -> np.ndarray:
     """Where the IMU has no gap and a speed is near, on one side at least at the ends and on both between."""
     t = imu_of(recording).index.to_numpy(float)
     near = np.zeros(t.size, bool)
@@ -251,7 +263,7 @@ def _supported(recording: Recording, sources: Use) -> np.ndarray:
     return near & ~(np.diff(t, prepend=t[0]) > max(5 * usual, 0.1))
 
 
-def summary(search: Search, start: float) -> dict[str, object]:
+def summary(search: Search, start: float) -> dict[str, Any]:
     """What a search has found beside the motion."""
     fit = fit_of(search)
     layout, parts = layout_of(search.use), parts_of(search.use)

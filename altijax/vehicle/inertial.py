@@ -19,7 +19,7 @@ PARTS = {
     "velocity": Part(size=3, std=10.0),
     "position": Part(size=3),
     "way": Part(),
-    "accelerometer_bias": Part(size=3, std=0.3, walk="accelerometer_walk"),
+    "accelerometer_bias": Part(size=3, std=0.15, walk="accelerometer_walk"),
     # Vibration rectified, and a body that leans on its springs for a while.
     "force_error": Part(size=3, level=("force_error",), time="force_error_time"),
     "accelerometer_scale": Part(size=3, std=0.015),
@@ -27,22 +27,33 @@ PARTS = {
     "accelerometer_axes": Part(size=3, entries=("yx", "zx", "zy"), std=0.005),
 }
 LEVELS = {
-    "rotation": Level(usual=0.005),
     "acceleration": Level(usual=0.05),
     "accelerometer_walk": Level(usual=1e-3, spread=1.0),
     "force_error": Level(usual=0.02),
     "force_error_time": Level(usual=5.0, spread=0.7),
-    "gyro_walk": Level(usual=1e-4, spread=1.0),
 }
+GYRO_LEVELS = {"rotation": Level(usual=0.005), "gyro_walk": Level(usual=1e-4, spread=1.0)}
 GYRO_PARTS = {
     "gyro_bias": Part(size=3, std=0.07, walk="gyro_walk"),
     "gyro_scale": Part(size=3, std=0.03),
     # The shares of the other axes' rates in a reading: of y and z in x, of x and z in y, of x and y in z.
     "gyro_axes": Part(size=6, entries=("xy", "xz", "yx", "yz", "zx", "zy"), std=0.005),
 }
-# Without a gyro the attitude walks as the vehicle turns, and what lasts of its rate walks as well.
-TURNING_PARTS = {"gyro_bias": Part(size=3, std=0.3, walk="gyro_walk")}
-TURNING_LEVELS = {"rotation": Level(usual=0.1), "gyro_walk": Level(usual=0.1, spread=1.0)}
+# Without a gyro the attitude walks as the vehicle turns, about each of its axes, and what lasts of its rate fades.
+_TURNING = ("turning_x", "turning_y", "turning_z")
+# A bias that may be large would take up what is wrong with so free a bank.
+TURNING_PARTS = {
+    "accelerometer_bias": Part(size=3, std=0.1, walk="accelerometer_walk"),
+    "gyro_bias": Part(size=3, level=_TURNING, time="turning_time"),
+}
+# Few epochs say little of how anything turns: a likelihood about one trajectory would have it turn ever less.
+TURNING_LEVELS = {
+    **{name: Level(usual=0.1, spread=0.5) for name in ("rotation_x", "rotation_y", "rotation_z")},
+    **{name: Level(usual=0.1, spread=0.5) for name in _TURNING},
+    "turning_time": Level(usual=2.0, spread=0.5),
+}
+
+ROTATION = ("rotation", "rotation_x", "rotation_y", "rotation_z")
 
 MOVING = ("attitude", "velocity", "position", "way")
 

@@ -45,7 +45,10 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Level:
-    """A noise level: what it usually is, and by what factor, as a logarithm, it may differ (one standard deviation)."""
+    """A noise level: what it usually is, and by what factor, as a logarithm, it may differ (one standard deviation).
+
+    One that may not differ at all is not fitted.
+    """
 
     usual: float
     spread: float = 1.5

@@ -22,7 +22,7 @@ from altijax.vehicle.sensors import Use, kinds_of, layout_of, levels_of
 from altijax.vehicle.smoother import Belief, Fit, between, vehicle_pass
 from altijax.vehicle.start import first_trajectory
 
-_between = quick_jit(between, static_argnums=0)
+between_readings = quick_jit(between, static_argnums=0)
 _pass = quick_jit(vehicle_pass, static_argnums=0)
 
 # Intervals between instants are about as long as this at most, s: what the gyro tells of a turn lasts for longer than
@@ -198,7 +198,7 @@ def passed(search: Search, passes: int, *, robust: bool = False) -> Search:
     for _ in range(passes):
         if abs(delay - search.rows_at) > _MOVED:
             search = replace(search, rows=search.measured(delay), rows_at=delay)
-        said = _between(search.use, search.readings, trajectory, np.float64(delay))
+        said = between_readings(search.use, search.readings, trajectory, np.float64(delay))
         fit = jax.device_get(_one(search, trajectory, delay, said, search.levels))
         trajectory = fit.trajectory
         change = 0.0
@@ -227,7 +227,7 @@ def _one(search: Search, trajectory: Trajectory, delay: float, said: Between, le
 
 def said_between(search: Search) -> Between:
     """What the readings say between the instants of a search's trajectory."""
-    return jax.device_get(_between(search.use, search.readings, search.trajectory, np.float64(search.delay)))
+    return jax.device_get(between_readings(search.use, search.readings, search.trajectory, np.float64(search.delay)))
 
 
 def fit_of(search: Search) -> Fit:
@@ -239,13 +239,13 @@ def fit_of(search: Search) -> Fit:
 def objective_of(search: Search) -> float:
     """Minus the logarithm of the posterior probability of the levels, about the last trajectory."""
     usual = levels_of(search.use)
-    off = [np.log(level / usual[name].usual) / usual[name].spread for name, level in search.levels.items()]
+    off = [np.log(search.levels[name] / level.usual) / level.spread for name, level in usual.items() if level.spread]
     return 0.5 * float(np.square(off).sum()) - float(fit_of(search).log_likelihood)
 
 
 def likely(search: Search, stage: Stages, rounds: int = 6) -> Search:
     """Noise levels and trajectory in turns, until the levels stay."""
-    known = levels_of(search.use)
+    known = {name: level for name, level in levels_of(search.use).items() if level.spread}
     usual = {name: level.usual for name, level in known.items()}
     spread = {name: level.spread for name, level in known.items()}
     # What all others contradict must not make the levels so large that it no longer stands out.
@@ -254,9 +254,10 @@ def likely(search: Search, stage: Stages, rounds: int = 6) -> Search:
     for turn in range(rounds):
         stage(f"noise levels, round {turn + 1}")
         likelihood = partial(_likelihood, search, said_between(search))
-        levels, objective = likely_levels(likelihood, search.levels, usual, spread, _REACH)
+        start = {name: search.levels[name] for name in known}
+        levels, objective = likely_levels(likelihood, start, usual, spread, _REACH)
         settled = turn > 1 and abs(objective - search.objective) < _BETTER
-        search = passed(replace(search, levels=levels, objective=objective), 8, robust=True)
+        search = passed(replace(search, levels=search.levels | levels, objective=objective), 8, robust=True)
         if settled:
             break
     return passed(search, 8)
@@ -264,5 +265,5 @@ def likely(search: Search, stage: Stages, rounds: int = 6) -> Search:
 
 def _likelihood(search: Search, said: Between, levels: Mapping[str, float]) -> tuple[float, Mapping[str, float]]:
     """Logarithm of the likelihood of levels about the trajectory of a search, and its derivative by each."""
-    fit = _one(search, search.trajectory, search.delay, said, levels)
+    fit = _one(search, search.trajectory, search.delay, said, {**search.levels, **levels})
     return float(fit.log_likelihood), {name: float(slope) for name, slope in fit.by_level.items()}

@@ -21,7 +21,7 @@ LEVERS = ("antenna", "axle")
 """Parts that only a gyro tells of."""
 
 Use = tuple[str, ...]
-"""Names of `KINDS` in use, "gyro", and "wind" for a craft in moving air."""
+"""Names of `KINDS` in use, "gyro", "craft" for a body that may point off its course, and "wind" for moving air."""
 
 
 def kinds_of(use: Use) -> dict[str, Kind]:
@@ -37,14 +37,16 @@ def parts_of(use: Use) -> dict[str, Part]:
     if "gyro" not in use:
         # What turns too fast to be known tells nothing of where sensors are.
         parts = {name: part for name, part in parts.items() if name not in LEVERS}
-    return parts | (course.WIND if "wind" in use else {})
+    return parts | (course.CRAFT if "craft" in use else {}) | (course.WIND if "wind" in use else {})
 
 
 def levels_of(use: Use) -> dict[str, Level]:
     """The noise levels of a set."""
-    levels: dict[str, Level] = inertial.LEVELS | ({} if "gyro" in use else inertial.TURNING_LEVELS)
+    levels: dict[str, Level] = inertial.LEVELS | (inertial.GYRO_LEVELS if "gyro" in use else inertial.TURNING_LEVELS)
     for kind in kinds_of(use).values():
         levels = levels | dict(kind.levels)
+    if "course" in use and "gyro" not in use:
+        levels = levels | course.untold_levels("craft" in use)
     return levels
 
 

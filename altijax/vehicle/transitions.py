@@ -13,7 +13,7 @@ from altijax import _safe
 from altijax.inference.layout import Layout
 from altijax.rotations import skew
 from altijax.vehicle.between import Between
-from altijax.vehicle.inertial import Trajectory, stationary
+from altijax.vehicle.inertial import ROTATION, Trajectory, stationary
 from altijax.vehicle.parts import Part
 
 Levels = Mapping[str, jax.Array]
@@ -62,7 +62,10 @@ def transitions(
     along = (mean / jnp.maximum(_safe.norm(mean), 1e-6)[:, None])[:, None]
     F = _transition(between, along, kept, parts, layout)
     c = _missing(x, between, along, kept, parts, gravity, layout)
-    return F, c, _noise(between, along, kept, levels, parts, layout)
+    walked = jnp.stack([levels[name] for name in ROTATION if name in levels])
+    C = trajectory.C_nb[:-1]
+    turning = C * walked**2 @ jnp.swapaxes(C, -1, -2)
+    return F, c, _noise(between, along, turning, kept, levels, parts, layout)
 
 
 def _transition(
@@ -110,19 +113,25 @@ def _missing(
 
 
 def _noise(
-    between: Between, along: jax.Array, kept: Levels, levels: Levels, parts: Mapping[str, Part], layout: Layout
+    between: Between,
+    along: jax.Array,
+    turning: jax.Array,
+    kept: Levels,
+    levels: Levels,
+    parts: Mapping[str, Part],
+    layout: Layout,
 ) -> jax.Array:
     dt, gap = between.duration[:, None, None], between.gap[:, None, None]
     identity = jnp.broadcast_to(jnp.eye(3, dtype=dt.dtype), (*between.duration.shape, 3, 3))
     none, by_turn = jnp.zeros_like(identity), between.by["turn"]
     lever = skew(between.gained[:, 3:6])
-    turned = levels["rotation"] ** 2 * dt + (_UNSEEN_TURN * gap) ** 2
+    turned = turning * dt + (_UNSEEN_TURN * gap) ** 2 * identity
     shaken = levels["acceleration"] ** 2 * dt + (_UNSEEN_ACCELERATION * gap) ** 2
     # An even turn is what the ends of a random walk leave on average; about it the walk still wanders.
-    wander = turned * (lever @ jnp.swapaxes(lever, -1, -2) / 12)
+    wander = lever @ turned @ jnp.swapaxes(lever, -1, -2) / 12
     # Of attitude, velocity and position by each source, and its covariance.
     sources = (
-        ((identity, by_turn, dt / 3 * by_turn), turned * identity),
+        ((identity, by_turn, dt / 3 * by_turn), turned),
         ((none, identity, dt / 2 * identity), shaken * identity + wander),
         ((none, none, identity), shaken * dt**2 / 12 * identity),
     )

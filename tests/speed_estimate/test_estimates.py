@@ -61,6 +61,19 @@ def test_initial_values_replace_the_aid(drive: Recording) -> None:
     assert abs(estimate["pitch"].iloc[0]) < 0.05
 
 
+@pytest.mark.parametrize("method", ["conventional", "roll"])
+def test_without_aid_the_initial_values_are_begun_from_exactly(method: str) -> None:
+    """Error-free sensors, ten rad of turning on a level road: the first second must not move the state."""
+    t = np.arange(0, 60, 0.01)
+    speed, rate = 12 + 4 * np.sin(0.3 * t), 0.26 * np.sin(0.5 * t)
+    readings = {"ax": 1.2 * np.cos(0.3 * t), "ay": speed * rate, "az": 9.80665, "gx": 0.0, "gy": 0.0, "gz": rate}
+    exact = Recording(name="exact", imu=pd.DataFrame(readings, index=pd.Index(t + 3.0, name="t")))
+    assert np.abs(rate).sum() * 0.01 > 9.5
+    estimate = estimate_speed(exact, method=method, initial_speed=12.0, initial_pitch=0.0)
+    assert np.abs(estimate["speed"] - speed).max() < 0.05
+    assert estimate["speed_std"].iloc[0] == pytest.approx(1.0) and estimate["speed_std"].is_monotonic_increasing
+
+
 def test_noise_levels_are_those_of_the_drive(drive: Recording) -> None:
     with jax.enable_x64(True):
         steps = drive_in_steps(drive, None, 20.0)

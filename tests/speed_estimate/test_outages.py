@@ -72,6 +72,16 @@ def test_the_aid_after_an_outage_began_only_scores(drive: Recording) -> None:
     assert not np.allclose(spoiled[~early]["error"], clean[~early]["error"])
 
 
+def test_a_drive_whose_aid_begins_late_counts_from_there(drive: Recording) -> None:
+    """A receiver that needs some seconds for its first fix."""
+    late = replace(drive, wheel=drive.wheel[8.0:])
+    errors = outage_errors(late, ("filter",), (5.0,), 10.0, first=14.0)
+    assert list(errors["start"]) == [pytest.approx(start, abs=0.03) for start in (22.0, 32.0)]
+    assert errors["error"].abs().max() < 3.0
+    with pytest.raises(ValueError, match="within the time of its IMU"):
+        outage_errors(replace(drive, wheel=drive.wheel.set_index(drive.wheel.index + 900.0)), ("filter",))
+
+
 def test_wrong_options_are_named(drive: Recording) -> None:
     with pytest.raises(ValueError, match="method must be one of conventional"):
         outage_table(drive, ("filter", "magic"))

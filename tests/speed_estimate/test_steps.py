@@ -9,7 +9,7 @@ import pytest
 from altijax.calibration.records import Calibration, constants_table
 from altijax.recordings import Recording
 from altijax.speed_estimate.model import STATES
-from altijax.speed_estimate.steps import STEP, drive_in_steps, initial_state, steps_until
+from altijax.speed_estimate.steps import STEP, drive_in_steps, from_first_aid, initial_state, steps_until
 from tests.made_drives import curvy_recording
 
 
@@ -89,6 +89,12 @@ def test_a_late_aid_does_not_serve_beyond_its_end(drive: Recording) -> None:
     late = drive_in_steps(drive, calibration(wheel_delay=0.3), 20.0)
     inputs = steps_until(late, 20.0)
     assert not inputs["aided"][STEP * np.arange(inputs["aided"].size) > 19.8].any()
+
+
+def test_a_recording_begins_with_its_first_aid_where_that_is_late(drive: Recording) -> None:
+    assert from_first_aid(drive) is drive
+    late = from_first_aid(replace(drive, wheel=drive.wheel[9.0:]))
+    assert late.imu.index[0] == pytest.approx(9.0, abs=0.021) and len(late.wheel) == len(drive.wheel[9.0:])
 
 
 def test_the_initial_state_is_that_of_the_first_second(drive: Recording) -> None:

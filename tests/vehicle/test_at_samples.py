@@ -10,7 +10,9 @@ from tests.vehicle.made import USE, short_drive, short_search
 
 def samples() -> object:
     search = short_search()
-    return at_samples(short_drive(), layout_of(USE), search.fit, said_between(search), search.levels)
+    return at_samples(
+        short_drive(), layout_of(USE), search.trajectory, search.fit.covariance, said_between(search), search.levels
+    )
 
 
 def test_positions_are_the_integral_of_velocities() -> None:

@@ -25,7 +25,7 @@ def test_derivatives_by_levels_are_those_of_the_likelihood(name: str) -> None:
 
 
 def test_it_settles() -> None:
-    search = short_search()
+    search = passed(short_search(), 4)
     again = passed(search, 1)
     assert float(again.fit.step) < 1e-3
     assert np.abs(again.trajectory.x - search.trajectory.x).max() < 1e-2

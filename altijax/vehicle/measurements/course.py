@@ -1,5 +1,7 @@
 """The direction of travel: along body x but for the mounting, slips, and the wind of a craft."""
 
+from dataclasses import replace
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -63,4 +65,18 @@ KIND = Kind(
     levels={"sideslip": Level(usual=0.1), "attack": Level(usual=0.1), "slip_time": Level(usual=3.0)},
     floor=floor,
 )
+# The mount of a craft's IMU is in its sideslip, which is as large as a crooked mount and which nothing in flight tells
+# from it.
+CRAFT = {"mounting": replace(MOUNTING, std=(0.0, 0.1))}
 WIND = {"wind": Part(size=2, entries=("e", "n"), std=10.0)}
+
+
+def untold_levels(craft: bool) -> dict[str, Level]:
+    """Slips where no gyro tells of the attitude: it would follow the course as closely as it is told to, and no
+    likelihood can say how closely that is. Assumed, of a car and of a small aircraft."""
+    usual = 0.1 if craft else 0.05
+    return {
+        "sideslip": Level(usual=usual, spread=0.0),
+        "attack": Level(usual=usual, spread=0.0),
+        "slip_time": Level(usual=3.0, spread=0.0),
+    }

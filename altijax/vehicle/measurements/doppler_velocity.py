@@ -75,8 +75,8 @@ KIND = Kind(
         ),
     },
     levels={
-        "horizontal": Level(usual=1.0),
-        "vertical": Level(usual=1.0),
+        "horizontal": Level(usual=1.0, spread=0.5),
+        "vertical": Level(usual=1.0, spread=0.5),
         "lasting_horizontal": Level(usual=0.02),
         "lasting_vertical": Level(usual=0.03),
         "receiver_time": Level(usual=10.0, spread=1.0),
