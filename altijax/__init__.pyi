@@ -22,6 +22,7 @@ from . import (
     rotations as rotations,
     sensors as sensors,
     signals as signals,
+    simulation as simulation,
     smoothing as smoothing,
     speed as speed,
     strapdown as strapdown,
@@ -216,6 +217,9 @@ from .signals import (
     low_pass as low_pass,
     periodic_extension as periodic_extension,
     resample as resample,
+)
+from .simulation import (
+    simulate_recording as simulate_recording,
 )
 from .smoothing import (
     SmoothVelocity as SmoothVelocity,

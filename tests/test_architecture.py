@@ -45,7 +45,7 @@ LEVELS = [
     ["formats.registry", "formats.tidy_writer"],
     ["recordings", "calibration.reference_fit"],
     ["conversions"],
-    ["datasets", "drives", "tables"],
+    ["datasets", "drives", "tables", "simulation"],
     ["motion_estimate.readings", "elevation_estimate.model", "elevation_estimate.smoother", "calibration.drives"],
     ["vehicle.parts", "vehicle.mounting"],
     ["vehicle.inertial", "vehicle.measurements.course", "vehicle.measurements.standstill"],
