@@ -26,6 +26,7 @@ from . import (
     smoothing as smoothing,
     speed as speed,
     strapdown as strapdown,
+    sweeps as sweeps,
     tables as tables,
     wahba as wahba,
     wheels as wheels,
@@ -259,6 +260,10 @@ from .streaming import (
     speed_step as speed_step,
     state_from_dict as state_from_dict,
     state_to_dict as state_to_dict,
+)
+from .sweeps import (
+    read_off as read_off,
+    sweep as sweep,
 )
 from .tables import (
     recording_from_tables as recording_from_tables,

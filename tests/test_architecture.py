@@ -34,7 +34,7 @@ LEVELS = [
     ["padding", "series", "toml_lines", "programs", "speed_estimate.dead_reckoning"],
     ["inference.layout", "inference.levels"],
     ["stages", "formats.stream_checks", "motion_estimate.start"],
-    ["formats.tables", "formats.quantities", "formats.ubx_frames", "calibration.records"],
+    ["sweeps", "formats.tables", "formats.quantities", "formats.ubx_frames", "calibration.records"],
     ["formats.text_tables", "formats.containers", "formats.ubx_solutions", "formats.ubx_ticks"],
     ["formats.mixed_tables"],
     ["formats.phones"],
