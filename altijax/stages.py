@@ -33,9 +33,9 @@ class Stages:
         logger.debug("%s: %s", self._title, stage)
         self._bar.show(f"{self._title}: {stage}")
 
-    def advance(self) -> None:
-        """Say that one of the items is done."""
-        self._done += 1
+    def advance(self, items: int = 1) -> None:
+        """Say that so many of the items are done."""
+        self._done += items
         of = "" if self._total is None else f" {self._done}/{self._total}"
         self._bar.show(self._title + of)
 

@@ -8,6 +8,7 @@ from concurrent.futures import Executor, as_completed
 from contextlib import nullcontext
 from functools import partial
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import jax
 import jax.numpy as jnp
@@ -18,11 +19,12 @@ from altijax.stages import stages
 
 Grid = Mapping[str, Sequence[Any] | Mapping[str, Any]]
 Outcome = dict[str, float] | str
-Run = tuple[dict[str, Any], jax.Array | None]
 
 # Combinations that run in one program at a time: a minute of drive at 100 Hz then needs some 100 MB.
 _CHUNK = 64
 _INTERRUPTED = "interrupted"
+# Whether functions can be traced, by the kinds of their arguments.
+_TRACEABLE: WeakKeyDictionary[Callable[..., Any], dict[Any, bool]] = WeakKeyDictionary()
 
 
 def sweep(
@@ -79,7 +81,8 @@ def sweep(
     UserWarning
         If the sweep was interrupted (Ctrl-C): what is done is returned.
     """
-    key_data = jax.random.key_data(jax.random.key(0) if key is None else key).tolist()
+    key = jax.random.key(0) if key is None else key
+    key_data = jax.random.key_data(key).tolist()
     before = grid if isinstance(grid, pd.DataFrame) else None
     if before is not None:
         if before.attrs.get("repeats") != repeats or before.attrs.get("key") != key_data:
@@ -88,25 +91,24 @@ def sweep(
     axes = _axes(grid)
     with_key = _takes_key(function, list(axes), repeats)
     cells = [dict(zip(axes, values, strict=True)) for values in itertools.product(*map(dict.values, axes.values()))]
-    root = jax.random.wrap_key_data(jnp.asarray(key_data, jnp.uint32))
-    keys = [jax.random.fold_in(root, repeat) if with_key else None for repeat in range(repeats)]
+    keys = list(jax.random.key_data(_keys(key, repeats))) if with_key else [None]
     todo = [k for k in range(len(cells)) if before is None or before["reason"].iloc[k] == _INTERRUPTED]
-    runs = [(cells[k], again) for k in todo for again in keys]
-    outcomes: list[Outcome] = [_INTERRUPTED] * len(runs)
-    with stages("sweep", len(runs)) if progress else nullcontext() as stage:
+    outcomes: list[list[Outcome]] = [[_INTERRUPTED] * repeats for _ in todo]
+    with stages("sweep", len(todo) * repeats) if progress else nullcontext() as stage:
         try:
-            for number, outcome in _outcomes(function, runs, chunk or _CHUNK, executor):
-                outcomes[number] = outcome
+            for done in _outcomes(function, [cells[k] for k in todo], keys, chunk or _CHUNK, executor):
+                for cell, repeat, outcome in done:
+                    outcomes[cell][repeat] = outcome
                 if stage is not None:
-                    stage.advance()
+                    stage.advance(len({run[:2] for run in done}))
         except KeyboardInterrupt:
-            done = len(runs) - outcomes.count(_INTERRUPTED)
+            whole = sum(_INTERRUPTED not in of_cell for of_cell in outcomes)
             warnings.warn(
-                f"the sweep was interrupted after {done} of {len(runs)} runs: call sweep again with the result in "
-                "place of the grid to go on",
+                f"the sweep was interrupted after {whole} of {len(todo)} combinations: call sweep again with the "
+                "result in place of the grid to go on",
                 stacklevel=2,
             )
-    rows = [_row(outcomes[k : k + repeats], repeats) for k in range(0, len(runs), repeats)]
+    rows = [_row(of_cell, repeats) for of_cell in outcomes]
     index = _index(axes)
     result = pd.DataFrame(rows, index=index[todo])
     if before is not None:
@@ -225,37 +227,46 @@ def _takes_key(function: Callable[..., Any], names: list[str], repeats: int) -> 
     return with_key
 
 
+_keys = jax.jit(lambda key, repeats: jax.vmap(partial(jax.random.fold_in, key))(jnp.arange(repeats)), static_argnums=1)
+
+
 def _outcomes(
-    function: Callable[..., Any], runs: list[Run], chunk: int, executor: Executor | None
-) -> Iterator[tuple[int, Outcome]]:
-    """Numbers of runs and what came of them, in the order in which they are done."""
-    if executor is None and runs and (stacked := _stacked(runs)) is not None and _is_traceable(function, runs[0]):
-        yield from _in_chunks(function, stacked, len(runs), chunk)
-    elif executor is None:
-        for number, (values, key) in enumerate(runs):
-            yield number, _tried(function, values, None if key is None else jax.random.key_data(key))
-    else:
-        data = [(values, None if key is None else np.asarray(jax.random.key_data(key))) for values, key in runs]
-        futures = {executor.submit(_tried, function, *run): number for number, run in enumerate(data)}
-        try:
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        finally:
-            for future in futures:
-                future.cancel()
-
-
-def _tried(function: Callable[..., Any], values: dict[str, Any], key_data: Any) -> Outcome:
+    function: Callable[..., Any],
+    cells: list[dict[str, Any]],
+    keys: list[Any],
+    chunk: int,
+    executor: Executor | None,
+) -> Iterator[list[tuple[int, int, Outcome]]]:
+    """Combinations, repeats and what came of them, in the order in which they are done."""
+    runs = list(itertools.product(range(len(cells)), range(len(keys))))
+    if executor is None and cells and (stacked := _stacked(cells)) is not None:
+        if _is_traceable(function, jax.tree.map(lambda x: x[0], stacked), keys[0]):
+            yield from _in_chunks(function, stacked, keys, len(cells), chunk)
+            return
+    if executor is None:
+        for cell, repeat in runs:
+            yield [(cell, repeat, _tried(function, cells[cell], keys[repeat]))]
+        return
+    futures = {executor.submit(_tried, function, cells[cell], keys[repeat]): (cell, repeat) for cell, repeat in runs}
     try:
-        key = None if key_data is None else jax.random.wrap_key_data(jnp.asarray(key_data))
-        return {name: float(x) for name, x in _named(function, values, key).items()}
+        for future in as_completed(futures):
+            yield [(*futures[future], future.result())]
+    finally:
+        for future in futures:
+            future.cancel()
+
+
+def _tried(function: Callable[..., Any], values: dict[str, Any], key_data: np.ndarray | None) -> Outcome:
+    try:
+        return {name: float(x) for name, x in _named(function, values, key_data).items()}
     except Exception as error:  # whatever a function of the user's raises is the reason of its row
         return f"{type(error).__name__}: {error}"
 
 
-def _named(function: Callable[..., Any], values: Mapping[str, Any], key: jax.Array | None) -> dict[str, Any]:
+def _named(function: Callable[..., Any], values: Mapping[str, Any], key_data: Any) -> dict[str, Any]:
     """What the function returns, by name."""
-    result = function(**values) if key is None else function(**values, key=key)
+    noise = {} if key_data is None else {"key": jax.random.wrap_key_data(jnp.asarray(key_data))}
+    result = function(**values, **noise)
     named = dict(result.items()) if isinstance(result, Mapping | pd.Series) else {"value": result}
     for name, x in named.items():
         if np.ndim(x):
@@ -263,27 +274,33 @@ def _named(function: Callable[..., Any], values: Mapping[str, Any], key: jax.Arr
     return {str(name): x for name, x in named.items()}
 
 
-def _stacked(runs: list[Run]) -> Any:
-    """The runs' values and keys, each a batch; None where values are no numbers or differ in kind."""
-    leaves, kinds = zip(*(jax.tree.flatten(values) for values, _ in runs), strict=True)
+def _stacked(cells: list[dict[str, Any]]) -> Any:
+    """The combinations' values as arrays, each a batch; None where they are no numbers or differ in kind."""
+    leaves, kinds = zip(*(jax.tree.flatten(values) for values in cells), strict=True)
     if len(set(kinds)) > 1:
         return None
     columns = [[np.asarray(x) for x in column] for column in zip(*leaves, strict=True)]
     if any(x.dtype.kind not in "biuf" or x.shape != column[0].shape for column in columns for x in column):
         return None
-    values = jax.tree.unflatten(kinds[0], [np.stack(column) for column in columns])
-    keys = None if runs[0][1] is None else jnp.stack([key for _, key in runs if key is not None])
-    return values, keys
+    return jax.tree.unflatten(kinds[0], [np.stack(column) for column in columns])
 
 
-def _is_traceable(function: Callable[..., Any], run: Run) -> bool:
+def _is_traceable(function: Callable[..., Any], values: Any, key_data: Any) -> bool:
     """Whether JAX can trace the function, and traces the same twice: not where NumPy's random numbers are in it."""
+    kind = jax.tree.structure(values), tuple(x.dtype for x in jax.tree.leaves(values))
+    known = _TRACEABLE.setdefault(function, {})
+    if kind not in known:
+        known[kind] = _traces_alike(function, values, key_data)
+    return known[kind]
+
+
+def _traces_alike(function: Callable[..., Any], values: Any, key_data: Any) -> bool:
     traced = []
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # what a trial has to say it will say again
         for _ in range(2):
             try:
-                found = jax.make_jaxpr(lambda values, key: _numbers(function, values, key))(*run)
+                found = jax.make_jaxpr(lambda values, key: _numbers(function, values, key))(values, key_data)
             except Exception:  # a function that is not made for tracers may raise anything: it runs without
                 return False
             traced.append(found)
@@ -291,24 +308,40 @@ def _is_traceable(function: Callable[..., Any], run: Run) -> bool:
     return str(one) == str(two) and all(np.array_equal(a, b) for a, b in zip(one.consts, two.consts, strict=True))
 
 
-def _numbers(function: Callable[..., Any], values: Mapping[str, Any], key: jax.Array | None) -> dict[str, jax.Array]:
-    return {name: jnp.asarray(x) for name, x in _named(function, values, key).items()}
+def _numbers(function: Callable[..., Any], values: Mapping[str, Any], key_data: Any) -> dict[str, jax.Array]:
+    return {name: jnp.asarray(x) for name, x in _named(function, values, key_data).items()}
 
 
 @partial(jax.jit, static_argnums=0)
 def _at_once(function: Callable[..., Any], values: Any, keys: jax.Array | None) -> dict[str, jax.Array]:
-    return jax.vmap(partial(_numbers, function))(values, keys)
+    """By combination and repeat; what depends on the key alone is computed once for all combinations."""
+    of_cell = partial(_numbers, function)
+    if keys is not None:
+        of_cell = jax.vmap(of_cell, (None, 0))
+    return jax.vmap(of_cell, (0, None))(values, keys)
 
 
-def _in_chunks(function: Callable[..., Any], stacked: Any, count: int, chunk: int) -> Iterator[tuple[int, Outcome]]:
-    """Chunks of one size, the last one filled up with the last run."""
-    parts = -(-count // chunk)
-    size = -(-count // parts)
-    for begin in range(0, count, size):
-        rows = np.minimum(np.arange(begin, begin + size), count - 1)
-        found = jax.device_get(_at_once(function, *jax.tree.map(lambda x, rows=rows: x[rows], stacked)))
-        for k in range(min(size, count - begin)):
-            yield begin + k, {name: float(x[k]) for name, x in found.items()}
+def _in_chunks(
+    function: Callable[..., Any], stacked: Any, keys: list[Any], count: int, chunk: int
+) -> Iterator[list[tuple[int, int, Outcome]]]:
+    """Chunks of one size of combinations and repeats, the last ones filled up."""
+    cells, repeats = _parts(count, max(chunk // len(keys), 1)), _parts(len(keys), chunk)
+    for rows, columns in itertools.product(cells, repeats):
+        values = jax.tree.map(lambda x, rows=rows: x[rows], stacked)
+        with_keys = None if keys[0] is None else np.stack([keys[k] for k in columns])
+        found = jax.device_get(_at_once(function, values, with_keys))
+        found = {name: x.reshape(len(rows), len(columns)) for name, x in found.items()}
+        # Filling repeats the last one: the same outcome again.
+        yield [
+            (int(cell), int(repeat), {name: float(x[i, j]) for name, x in found.items()})
+            for (i, cell), (j, repeat) in itertools.product(enumerate(rows), enumerate(columns))
+        ]
+
+
+def _parts(count: int, most: int) -> list[np.ndarray]:
+    """Numbers from zero in parts of one size, the last one filled up with the last number."""
+    size = -(-count // -(-count // most))
+    return [np.minimum(np.arange(begin, begin + size), count - 1) for begin in range(0, count, size)]
 
 
 def _row(outcomes: list[Outcome], repeats: int) -> dict[str, Any]:
