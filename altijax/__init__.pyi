@@ -10,6 +10,7 @@ from . import (
     drives as drives,
     earth as earth,
     estimates as estimates,
+    gradients as gradients,
     instruments as instruments,
     least_squares as least_squares,
     metrics as metrics,
@@ -127,6 +128,10 @@ from .estimates import (
 from .formats.registry import (
     register_format as register_format,
 )
+from .gradients import (
+    differentiable as differentiable,
+    sensitivity as sensitivity,
+)
 from .instruments import (
     DOPPLER_1_HZ as DOPPLER_1_HZ,
     FIBRE_OPTIC_GYRO as FIBRE_OPTIC_GYRO,
@@ -156,11 +161,17 @@ from .motions import (
     windsurfer_pose as windsurfer_pose,
 )
 from .plots import (
+    house_style as house_style,
+    plot_calibration as plot_calibration,
     plot_calibration_correlation as plot_calibration_correlation,
     plot_calibration_errors as plot_calibration_errors,
     plot_elevation as plot_elevation,
     plot_elevation_error as plot_elevation_error,
+    plot_map as plot_map,
+    plot_motion as plot_motion,
+    plot_speed as plot_speed,
     plot_streams as plot_streams,
+    plot_sweep as plot_sweep,
 )
 from .programs import (
     count_programs as count_programs,

@@ -17,6 +17,7 @@ Item = TypeVar("Item")
 
 logger = logging.getLogger("altijax")
 
+_TRACED = (jax.errors.TracerArrayConversionError, jax.errors.ConcretizationTypeError)
 # Until the first word, and between two ticks of the clock, s.
 _SILENT, _TICK = 2.0, 1.0
 
@@ -125,6 +126,8 @@ def stages(title: str, total: int | None = None) -> Iterator[Stages]:
     ------
     RuntimeError
         In a process that was forked after JAX had run: it would wait for ever.
+    TypeError
+        If the work inside meets a tracer, as where somebody differentiates a verb.
     """
     if _FORKS.happened:
         raise RuntimeError(
@@ -153,6 +156,15 @@ def stages(title: str, total: int | None = None) -> Iterator[Stages]:
     try:
         with count_programs() as programs:
             yield Stages(title, total, bar)
+    except (*_TRACED, ValueError) as error:
+        # NumPy says no more than that it cannot take one into an array.
+        if not isinstance(error, _TRACED) and not isinstance(error.__cause__, _TRACED):
+            raise
+        raise TypeError(
+            f"{title}: this works on numbers, in NumPy and pandas, and JAX can neither differentiate, batch nor "
+            "compile it; altijax.differentiable(recording, method) returns a function that it can"
+        ) from error
+    else:
         logger.info(
             "%s: %.1f s; %d program(s) compiled in %.1f s, %d of them kept ones loaded",
             *(title, time.perf_counter() - began, programs.number, programs.seconds, programs.loaded),

@@ -64,8 +64,10 @@ LEVELS = [
     ["streaming", "elevation_estimate.calibration", "motion_estimate.scores", "speed_estimate.estimates"],
     ["samples.make_hill_road", "samples.hilly_drives", "samples.foreign_drives"],
     ["speed_estimate.outages", "speed_estimate.calibration", "motion_estimate.calibration"],
-    ["estimates"],
-    ["plots"],
+    ["estimates", "gradients"],
+    ["plots.style"],
+    ["plots.elevation", "plots.speed", "plots.streams", "plots.map", "plots.sweeps"],
+    ["plots.calibration", "plots.motion"],
 ]
 LEVEL = {name: number for number, names in enumerate(LEVELS) for name in names}
 CORE = {name for name in LEVEL if LEVEL[name] <= LEVEL["metrics"]}

@@ -61,9 +61,9 @@ def estimate_elevation(
         of the recording.
     """
     require_method(method)
-    known = None if known_heights is None else _known_heights(known_heights, recording)
-    fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
     with jax.enable_x64(True), stages(f"elevation of {recording.name} by {method!r}") as stage:
+        known = None if known_heights is None else _known_heights(known_heights, recording)
+        fixed = {} if initial_vertical_speed is None else {"initial_vertical_speed": float(initial_vertical_speed)}
         stage("readings")
         drive, grid = drive_arrays(with_corrected_turns(recording, calibration), turns=method != "slope")
         stage("constants")

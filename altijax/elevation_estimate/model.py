@@ -41,7 +41,7 @@ _LEAST, _LEAST_NAMES = 16384, 8
 
 @jax.tree_util.register_dataclass
 @dataclass(frozen=True, kw_only=True)
-class _Readings:
+class ElevationReadings:
     """Readings on the grid behind the low pass, filled up at the end."""
 
     t: Array
@@ -55,7 +55,7 @@ class _Readings:
     from_wheel: Array
 
 
-_KEPT: WeakKeyDictionary[Drive, tuple[float, _Readings]] = WeakKeyDictionary()
+_KEPT: WeakKeyDictionary[Drive, tuple[float, ElevationReadings]] = WeakKeyDictionary()
 
 
 def elevation(values: Mapping[str, float], drive: Drive, method: str) -> dict[str, np.ndarray]:
@@ -119,13 +119,13 @@ def _linearised_at(
             _linearised(
                 np.array([at[name] for name in NAMES], float),
                 padded(directions, bucket(len(names), _LEAST_NAMES), 0.0),
-                _readings(drive, at["wheel_delay" if drive.from_wheel else "gnss_delay"]),
+                readings_of(drive, at["wheel_delay" if drive.from_wheel else "gnss_delay"]),
                 "slope" if method == "fused" else method,
             ),
         )
 
 
-def _readings(drive: Drive, delay: float) -> _Readings:
+def readings_of(drive: Drive, delay: float) -> ElevationReadings:
     """Readings of a drive at a delay of its speed; the last ones are kept while the drive is, for fits ask again."""
     kept = _KEPT.get(drive)
     if kept is None or kept[0] != delay:
@@ -133,14 +133,14 @@ def _readings(drive: Drive, delay: float) -> _Readings:
     return kept[1]
 
 
-def _filtered(drive: Drive, delay: float) -> _Readings:
+def _filtered(drive: Drive, delay: float) -> ElevationReadings:
     t, count = np.asarray(drive.t), drive.t.shape[0]
     size = bucket(count, _LEAST)
     raw = np.stack(_speed_at(t + delay, np.asarray(drive.t_speed), np.asarray(drive.speed)))
     smooth = low_pass(t, np.vstack([np.transpose(drive.f), drive.yaw_rate, np.square(drive.yaw_rate), raw]), _CUTOFF)
     speed = np.stack([raw, smooth[5:], np.gradient(smooth[5:], t, axis=-1, edge_order=2)])
     fill = partial(padded, size=size, axis=-1)
-    return _Readings(
+    return ElevationReadings(
         t=np.append(t, t[-1] + t[1] * np.arange(1, size - count + 1)),
         f=fill(smooth[:3]),
         yaw_rate=fill(smooth[3]),
@@ -164,12 +164,12 @@ def _speed_at(t: np.ndarray, t_speed: np.ndarray, speed: np.ndarray) -> tuple[np
 
 @partial(jax.jit, static_argnames="method")
 def _linearised(
-    x: jax.Array, directions: jax.Array, readings: _Readings, method: str
+    x: jax.Array, directions: jax.Array, readings: ElevationReadings, method: str
 ) -> tuple[dict[str, jax.Array], jax.Array]:
     """Elevation and the rest for all `NAMES`, and its derivatives (directions, time)."""
 
     def height(x: jax.Array) -> tuple[jax.Array, dict[str, jax.Array]]:
-        found = _elevation(dict(zip(NAMES, x, strict=True)), readings, method)
+        found = elevation_from(dict(zip(NAMES, x, strict=True)), readings, method)
         return found["elevation"], found
 
     _, columns, found = jax.vmap(
@@ -178,7 +178,8 @@ def _linearised(
     return found, columns
 
 
-def _elevation(value: dict[str, jax.Array], readings: _Readings, method: str) -> dict[str, jax.Array]:
+def elevation_from(value: dict[str, jax.Array], readings: ElevationReadings, method: str) -> dict[str, jax.Array]:
+    """Elevation and the rest for values of all `NAMES`, to be traced."""
     imu = triads(value)
     f_s = readings.f / imu.accelerometer_scale[:, None] - imu.accelerometer_bias[:, None]
     f_x, f_y, f_z = euler_to_matrix(imu.mounting) @ f_s
