@@ -59,7 +59,9 @@ def plot_map(
     if ax is None and find_spec("folium") is not None and "lat" in valid and valid["lat"].notna().any():
         return _streets(valid, recording, colour_by)
     with house_style():
-        return _plain(valid, recording, colour_by, axes_or_new(ax, (7.0, 6.0)))
+        wide, high = (float(np.ptp(valid[name])) for name in ("east", "north"))
+        size = (8.0, float(np.clip(7.0 * high / max(wide, 1e-9), 2.2, 7.0)) + 0.8)
+        return _plain(valid, recording, colour_by, axes_or_new(ax, size))
 
 
 def _plain(estimate: pd.DataFrame, recording: Recording | None, colour_by: str, ax: Axes) -> Axes:

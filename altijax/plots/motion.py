@@ -53,8 +53,8 @@ def plot_motion(
                 true = broken_at_wraps(true) if name == "heading" else true
                 axes.plot(reference.index, true, "k--", linewidth=0.9, label="reference")
             axes.set_ylabel(label)
-            finish(axes)
-            axes.get_legend().set_visible(axes in (ax[0], ax[1]))
+            finish(axes, columns=3)
+            axes.get_legend().set_visible(axes is ax[0])
         for axes in ax[-2:]:
             axes.set_xlabel("time (s)")
     return ax

@@ -50,7 +50,7 @@ def plot_speed(
             begin = min(float(estimate.index[0]) for estimate in labelled.values())
             ax.axvspan(begin, aided_until, color="0.93", zorder=0, linewidth=0, label="aided")
         ax.set(xlabel="time (s)", ylabel="speed (m/s)")
-        finish(ax, "Speed along the path", columns=4)
+        finish(ax, "Speed along the path")
     return ax
 
 

@@ -70,12 +70,12 @@ def draw_band(ax: Axes, x: np.ndarray, y: np.ndarray, std: np.ndarray, colour: s
     ax.fill_between(x, y - 2 * std, y + 2 * std, color=colour, alpha=0.18, linewidth=0)
 
 
-def finish(ax: Axes, title: str = "", *, columns: int = 3) -> None:
+def finish(ax: Axes, title: str = "", *, columns: int = 5, band: str = BAND) -> None:
     """Limits that show the lines, and a legend above the axes, with the bands in it, below the title."""
     show_lines(ax)
     handles, labels = ax.get_legend_handles_labels()
-    if ax.collections and any(label != BAND for label in labels) and BAND not in labels and _has_bands(ax):
-        handles, labels = [*handles, Patch(color="0.5", alpha=0.3, linewidth=0)], [*labels, BAND]
+    if _has_bands(ax):
+        handles, labels = [*handles, Patch(color="0.5", alpha=0.3, linewidth=0)], [*labels, band]
     rows = 0
     if handles:
         rows = -(-len(handles) // columns)
@@ -89,7 +89,7 @@ def show_lines(ax: Axes) -> None:
     """Vertical limits by the lines, with half as much again for bands: wide ones must not press the lines flat."""
     ends = [_ends(line.get_ydata()) for line in ax.get_lines() if len(np.atleast_1d(line.get_ydata())) > 2]
     ends = [pair for pair in ends if np.isfinite(pair).all()]
-    if not ends or not _has_bands(ax):
+    if not ends or not _has_bands(ax) or ax.get_yscale() == "log":
         return
     low, high = min(pair[0] for pair in ends), max(pair[1] for pair in ends)
     room = max(0.5 * (high - low), 1e-9)

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
@@ -69,10 +70,14 @@ def plot_sweep(
 
 
 def _lines(ax: Axes, result: pd.DataFrame, name: str, limit: float | None, label: str) -> None:
-    along, *others = result.index.names
+    along, *others = map(str, result.index.names)
     groups = list(result.groupby(level=others[0], sort=False)) if others else [("", result)]
     by_factors = False
-    for (of, part), colour in zip(groups, colours(len(groups)), strict=True):
+    shades: list[Any] = list(colours(len(groups)))
+    if others and pd.api.types.is_numeric_dtype(result.index.get_level_values(others[0])):
+        # From dark to light as the number grows; the lightest yellow is pale on white.
+        shades = list(plt.get_cmap("viridis")(np.linspace(0, 0.9, len(groups))))
+    for (of, part), colour in zip(groups, shades, strict=True):
         part = part.droplevel(others[0]) if others else part
         if pd.api.types.is_numeric_dtype(part.index):
             part = part.sort_index()
@@ -82,7 +87,7 @@ def _lines(ax: Axes, result: pd.DataFrame, name: str, limit: float | None, label
         if limit is not None and pd.api.types.is_numeric_dtype(part.index):
             crossing = read_off(part, limit, value=name)
             if np.isfinite(crossing):
-                text += f": {_short(limit)} at {crossing:.3g}"
+                text += f": {_short(limit)} at {along} {crossing:.3g}"
                 ax.plot(crossing, limit, "o", color=colour, markersize=7, markerfacecolor="w", zorder=4)
         if f"{name}_error" in part:
             draw_band(ax, x, y, part[f"{name}_error"].to_numpy(float), colour)
@@ -95,7 +100,7 @@ def _lines(ax: Axes, result: pd.DataFrame, name: str, limit: float | None, label
     if len(values) and values.min() > 0 and values.max() > 20 * values.min():
         ax.set_yscale("log")
     ax.set(xlabel=str(along), ylabel=label)
-    finish(ax, f"{name} by {' and '.join(map(str, result.index.names))}", columns=2)
+    finish(ax, f"{name} by {' and '.join(map(str, result.index.names))}", columns=2, band="band: two standard errors")
 
 
 def _map(ax: Axes, result: pd.DataFrame, name: str, limit: float | None, label: str) -> None:
@@ -110,11 +115,12 @@ def _map(ax: Axes, result: pd.DataFrame, name: str, limit: float | None, label: 
     )
     norm = (LogNorm if wide else Normalize)(np.nanmin(z), np.nanmax(z))
     mesh = ax.pcolormesh(x, y, z, cmap="cividis", shading="gouraud", norm=norm)
-    lines = ax.contour(x, y, z, levels=levels, colors="w", linewidths=0.8)
+    lines = ax.contour(x, y, z, levels=[level for level in levels if level != limit], colors="w", linewidths=0.8)
     ax.clabel(lines, fmt=_short, fontsize=8)
     if limit is not None and np.nanmin(z) < limit < np.nanmax(z):
         bold = ax.contour(x, y, z, levels=[limit], colors="#D55E00", linewidths=2.5)
-        ax.clabel(bold, fmt=lambda level: f"{name} {_short(level)}", fontsize=9)
+        for text in ax.clabel(bold, fmt=lambda level: f"{name} {_short(level)}", fontsize=9):
+            text.set(color="k", bbox={"facecolor": "w", "edgecolor": "none", "pad": 1.5})
     for values, scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
         if spaced_by_factors(values):
             scale("log")
