@@ -173,8 +173,10 @@ def spaced_by_factors(values: np.ndarray) -> bool:
 
 def _crossing(x: np.ndarray, y: np.ndarray, limit: float) -> float:
     order = np.argsort(x)
-    x, above = x[order], y[order] - limit
+    x, y = x[order], y[order]
     by_factors = spaced_by_factors(x)
+    with_positive = by_factors and limit > 0 and bool(np.nanmin(y) > 0)
+    above = np.log(y / limit) if with_positive else y - limit
     x = np.log(x) if by_factors else x
     for k in range(len(x) - 1):
         if above[k] * above[k + 1] <= 0 and above[k] != above[k + 1]:

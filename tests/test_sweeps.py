@@ -117,8 +117,8 @@ def test_what_a_sensor_must_be_is_read_off() -> None:
     x = np.geomspace(0.01, 10, 7)
     found = sweep(lambda noise, gain: gain * noise, {"noise": x, "gain": [1.0, 2.0, 1e4]})
     crossing = read_off(found, 1.0)
-    # A straight line between logarithms is near a proportional law where the values are close.
-    assert crossing.loc[1.0] == pytest.approx(1.0, rel=0.3) and crossing.loc[2.0] == pytest.approx(0.5, rel=0.3)
+    # A power law is a straight line of logarithms.
+    assert crossing.loc[1.0] == pytest.approx(1.0) and crossing.loc[2.0] == pytest.approx(0.5)
     assert np.isnan(crossing.loc[1e4])
     assert read_off(sweep(lambda a: 3 - 2 * a, {"a": [0.0, 1.0, 2.0]}), 2.0) == pytest.approx(0.5)
     assert spaced_by_factors(x) and not spaced_by_factors(np.linspace(0.01, 10, 7))

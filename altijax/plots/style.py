@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+import matplotlib
 import matplotlib.pyplot as plt
 import numpy as np
 import pandas as pd
@@ -40,6 +41,9 @@ def house_style() -> Iterator[None]:
     """What is drawn inside has the house's style; matplotlib's settings are as before afterwards."""
     with plt.rc_context(STYLE):
         yield
+        interactive = plt.isinteractive()
+    # A notebook's backend, loaded with the first figure, switches interaction on; the context must not switch it off.
+    matplotlib.interactive(interactive)
 
 
 def by_label(estimates: Mapping[str, pd.DataFrame] | pd.DataFrame) -> dict[str, pd.DataFrame]:

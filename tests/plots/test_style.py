@@ -24,6 +24,13 @@ def test_settings_are_as_before_afterwards() -> None:
     assert dict(plt.rcParams) == before
 
 
+def test_interaction_that_a_first_figure_switches_on_stays_on() -> None:
+    with house_style():
+        plt.ion()
+    assert plt.isinteractive()
+    plt.ioff()
+
+
 def test_limits_show_the_lines_and_the_legend_the_bands() -> None:
     x = np.linspace(0, 1, 50)
     ax = axes_or_new(None)
