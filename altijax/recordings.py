@@ -5,30 +5,40 @@ import math
 import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
+from altijax.agreement.messages import tell_disagreements
+from altijax.agreement.report import agreement_report
+from altijax.formats.axes import axes_to_matrix
 from altijax.formats.containers import only_file, unpacked
 from altijax.formats.mixed_tables import read_mixed
-from altijax.formats.quantities import QUANTITIES, WHEELS, check_units, in_si_units, si_units
+from altijax.formats.packets import without_shared_stamps
+from altijax.formats.quantities import COLUMNS, QUANTITIES, WHEELS, check_units, in_si_units, si_units
 from altijax.formats.registry import described, format_of
+from altijax.formats.sentinels import without_impossible_values, without_sentinels
+from altijax.formats.stamps import UnusableStreamError, check_time_unit, mended_clocks, steady
 from altijax.formats.stream_checks import (
     RecordingError,
     RecordingWarning,
-    axes_to_matrix,
     check_accelerometer_unit,
     check_attitude_unit,
     check_course_unit,
-    check_gravity,
     check_gyro_unit,
     check_position,
-    check_time_unit,
     check_together,
     clean_rows,
+)
+from altijax.formats.stuck import (
+    check_ranges,
+    without_dead_wheels,
+    without_filled_stretches,
+    without_frozen_fixes,
+    without_frozen_speeds,
 )
 from altijax.formats.tables import at_accelerometer_times
 from altijax.formats.tidy_folder import wheel_from_pulses
@@ -48,7 +58,6 @@ _OPTIONAL: dict[str, set[str]] = {
     "gnss": {"v_u", "climb", "lat", "lon", "alt", "sd_e", "sd_n", "sd_u"},
     "reference": {"roll", "pitch", "heading", "v_e", "v_n", "v_u", "lat", "lon", "alt"},
 }
-_SLOWEST = {"imu": 0.5, "wheel": 1.0, "gnss": 60.0, "reference": 60.0}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -154,7 +163,7 @@ class Recording:
             "site": {"latitude": _degrees(self.site_latitude), "height": self.site_height},
             "units": si_units({stream: table.reset_index() for stream, table in tables.items()}),
         }
-        write_tidy_folder(folder, tables, sheet, form)
+        write_tidy_folder(folder, tables, sheet | {"saved": {"notes": [], "known": []}}, form)
         # What is found in these files is known: it need not be told again, and its words name other files.
         again, _ = _read(folder, None, {})
         write_sheet(folder, sheet | {"saved": {"notes": self.notes, "known": again.notes}})
@@ -166,15 +175,23 @@ class Recording:
                     "3.1 rounds the last digits of a CSV: save with form='parquet'"
                 )
 
+    @cached_property
+    def agreement(self) -> pd.DataFrame:
+        """What the streams say of each other, a row a pair; see `altijax.agreement.report.agreement_report`."""
+        return agreement_report({stream: getattr(self, stream) for stream in _STREAMS}, self.axes)[0]
+
     def __repr__(self) -> str:
         lines = [f"Recording {self.name!r}, axes {self.axes}: {self.description}", _formatted(self).to_string()]
+        if len(self.agreement):
+            lines += ["agreement of the streams", _shown(self.agreement).to_string()]
         return "\n".join(lines + [f"note: {note}" for note in self.notes])
 
     def _repr_html_(self) -> str:
         notes = "".join(f"<li>{html.escape(note)}</li>" for note in self.notes)
+        quality = _shown(self.agreement).to_html(border=0) if len(self.agreement) else ""
         return (
             f"<p><b>{html.escape(self.name)}</b>: {html.escape(self.description)}<br>axes {html.escape(self.axes)}"
-            f"</p>{_formatted(self).to_html(border=0)}<ul>{notes}</ul>"
+            f"</p>{_formatted(self).to_html(border=0)}{quality}<ul>{notes}</ul>"
         )
 
 
@@ -184,6 +201,7 @@ def read_recording(
     axes: str | None = None,
     units: Mapping[str, str] | None = None,
     columns: Mapping[str, str] | None = None,
+    clock: Mapping[str, float] | None = None,
 ) -> Recording:
     """Read a recording: a tidy folder, a log of a known format, or by `columns` any table of text.
 
@@ -232,17 +250,21 @@ def read_recording(
         Where the sensor's x, y and z point: F or B, L or R, U or D; overrides what the recording says.
     units : mapping of str to str, optional
         Units of a tidy folder or a table where they are neither those above nor in its recording.toml, by quantity:
-        ``time`` (s, ms, us, ns; all files), ``accelerometer`` (m/s^2, g, mg, gal; -m/s^2 and -g with the sign of iOS),
-        ``gyro`` (rad/s, deg/s), ``speed`` (m/s, km/h, mph, kn; wheel.csv), ``gnss_speed`` (the same; velocities and
-        their deviations in gnss.csv), ``course`` (deg, rad; gnss.csv), ``height`` (m, ft), ``attitude`` (rad, deg;
-        reference.csv). A unit that is stated is not doubted: its check is left out, and what the table says of it does
-        not count.
+        ``time`` (s, ms, us, ns, min, h, d; all files), ``accelerometer`` (m/s^2, g, mg, gal; -m/s^2 and -g with the
+        sign of iOS), ``gyro`` (rad/s, deg/s, mrad/s, mdeg/s, deg/h; -rad/s and -deg/s with the other sign), ``speed``
+        (m/s, km/h, mph, kn, cm/s, mm/s; wheel.csv), ``gnss_speed`` (the same; velocities and their deviations in
+        gnss.csv), ``course`` (deg, rad; gnss.csv), ``height`` (m, ft), ``attitude`` (rad, deg; reference.csv). What the
+        table says of a unit that is stated does not count; what rests on it is no error, and warns where the streams
+        say otherwise.
     columns : mapping of str to str, optional
         For one table of text in which several sensors stand, however its columns are called: the header of each of
         our columns, ``{"t": "Time", "ax": "Acc X [g]", "speed": "v (km/h)"}``. Where a name could mean several streams
         it is the wheel's or the receiver's, "gnss.speed" and "reference.alt" say otherwise. Units are taken from the
         headers or a line of units below them; separators, decimal commas, clock times and lines above the header are
         found. Each stream has the rows in which it has values.
+    clock : mapping of str to float, optional
+        Seconds to add to the times of a stream (imu, wheel, pulses, gnss, reference) whose clock is not that of the
+        others; over what recording.toml says.
 
     Returns
     -------
@@ -256,9 +278,9 @@ def read_recording(
     FileNotFoundError
         If there is nothing at `path`.
     ValueError
-        If `axes`, `units` or `columns` is not valid.
+        If `axes`, `units`, `columns` or `clock` is not valid.
     """
-    recording, problems = _read(Path(path), axes, dict(units or {}), columns)
+    recording, problems = _read(Path(path), axes, dict(units or {}), columns, dict(clock or {}))
     tell(problems)
     return recording
 
@@ -270,9 +292,16 @@ def tell(problems: Collection[str]) -> None:
 
 
 def _read(
-    path: Path, axes: str | None, units: Mapping[str, str], columns: Mapping[str, str] | None = None
+    path: Path,
+    axes: str | None,
+    units: Mapping[str, str],
+    columns: Mapping[str, str] | None = None,
+    clock: Mapping[str, float] | None = None,
 ) -> tuple[Recording, list[str]]:
     check_units(units)
+    unknown = [stream for stream in clock or {} if stream not in COLUMNS]
+    if unknown:
+        raise ValueError(f"clock has no stream {unknown[0]!r}; known are {', '.join(COLUMNS)}")
     problems: list[str] = []
     notes: list[str] = []
     with unpacked(path) as place:
@@ -288,7 +317,7 @@ def _read(
     sheet = {"name": place.resolve().name, **sheet}
     tables = described(tables, place, problems)
     given = dict.fromkeys(QUANTITIES) if fixes_units else units
-    recording, problems = recording_of(tables, sheet, problems, notes, axes=axes, given=given)
+    recording, problems = recording_of(tables, sheet, problems, notes, axes=axes, given=given, clock=clock)
     return replace(recording, source=str(path)), problems
 
 
@@ -300,6 +329,7 @@ def recording_of(
     *,
     axes: str | None = None,
     given: Mapping[str, str | None],
+    clock: Mapping[str, float] | None = None,
 ) -> tuple[Recording, list[str]]:
     """Streams checked, in SI units and body axes; and what is to be told.
 
@@ -315,6 +345,8 @@ def recording_of(
         Overrides what the sheet says.
     given : mapping
         Units by quantity, over what the sheet says; None where the tables are in SI units already.
+    clock : mapping, optional
+        Seconds to add to the times of streams, over what the sheet says.
 
     Returns
     -------
@@ -323,15 +355,19 @@ def recording_of(
     problems : list of str
         All problems but those that the sheet knows already.
     """
+    insisted = {*given, *(f"clock {stream}" for stream in clock or {})}
     if axes is not None:
         axes_to_matrix(axes)
+        insisted.add("axes")
+    tables = mended_clocks(tables, problems)
+    tables = {stream: without_sentinels(table, stream, problems) for stream, table in tables.items()}
     own = {quantity: unit for quantity, unit in sheet.get("units", {}).items() if quantity not in given}
     try:
         in_si_units(tables, own)
     except ValueError as error:
         raise RecordingError(f"recording.toml, {error}") from error
     in_si_units(tables, {quantity: unit for quantity, unit in given.items() if unit is not None})
-    clock = sheet.get("clock", {})
+    clock = {**sheet.get("clock", {}), **(clock or {})}
     tables = {stream: table.assign(t=table["t"] + clock.get(stream, 0.0)) for stream, table in tables.items()}
     stated = own.keys() | given.keys()
     if axes is None:
@@ -345,8 +381,10 @@ def recording_of(
         table, imu = tables.get(stream), streams.get("imu")
         if stream == "wheel" and "pulses" in tables and imu is not None:
             table = wheel_from_pulses(tables["pulses"], sheet.get("wheel", {}), imu, problems)
-        streams[stream] = None if table is None else _stream(stream, table, stated, axes, problems, notes)
-    check_together(streams, stated, problems)
+        streams[stream] = None if table is None else _stream(stream, table, stated, axes, problems, notes, tables)
+    check_together(streams, problems)
+    # What was saved was judged when it was read.
+    tell_disagreements(streams, axes, None if "saved" in sheet else insisted | own.keys(), problems)
     wheel, site, saved = (sheet.get(part, {}) for part in ("wheel", "site", "saved"))
     latitude = site.get("latitude")
     for frame in streams.values():
@@ -379,9 +417,9 @@ def describe(recording: Recording) -> pd.DataFrame:
     Returns
     -------
     table : DataFrame
-        One row a stream: number of samples; rate in Hz (from the median interval); dt_5 and dt_95, the 5 % and 95 %
-        quantiles of the interval in s; number of gaps (intervals above three medians) and the longest in s; first and
-        last time and duration in s; columns.
+        One row a stream: number of samples; rate in Hz (rows over their time, pauses aside); dt_5 and dt_95, the 5 %
+        and 95 % quantiles of the interval in s; number of gaps (intervals above three medians) and the longest in s;
+        first and last time and duration in s; columns.
     """
     rows = {}
     for stream in _STREAMS:
@@ -392,10 +430,11 @@ def describe(recording: Recording) -> pd.DataFrame:
         dt = np.diff(t)
         usual = np.median(dt) if dt.size else np.nan
         gaps = dt[dt > 3 * usual]
+        pauses = dt[dt > 3 * max(usual, dt.mean())] if dt.size else dt
         low, high = np.quantile(dt, [0.05, 0.95]) if dt.size else (np.nan, np.nan)
         rows[stream] = {
             "samples": len(t),
-            "rate": 1 / usual,
+            "rate": (dt.size - pauses.size) / (dt.sum() - pauses.sum()) if dt.size else np.nan,
             "dt_5": low,
             "dt_95": high,
             "gaps": len(gaps),
@@ -424,8 +463,22 @@ def _formatted(recording: Recording) -> pd.DataFrame:
     return table.assign(**{name: table[name].map(form.format) for name, form in forms.items() if len(table)})
 
 
+def _shown(agreement: pd.DataFrame) -> pd.DataFrame:
+    """The report for reading: rounded, and nothing where there is nothing."""
+    numbers = agreement.columns.drop(["verdict", "cause", "remedy"])
+    return agreement.assign(
+        **{name: ["" if pd.isna(value) else f"{value:.2f}" for value in agreement[name]] for name in numbers}
+    ).rename_axis(None)
+
+
 def _stream(
-    stream: str, table: pd.DataFrame, stated: Collection[str], axes: str, problems: list[str], notes: list[str]
+    stream: str,
+    table: pd.DataFrame,
+    stated: Collection[str],
+    axes: str,
+    problems: list[str],
+    notes: list[str],
+    tables: Mapping[str, pd.DataFrame],
 ) -> pd.DataFrame | None:
     """One stream in its final form, or None where nothing usable is left."""
     file = table.attrs["file"]
@@ -438,8 +491,11 @@ def _stream(
             table = at_accelerometer_times(_with_whole_gyro(table, problems), problems, notes)
         elif stream == "gnss":
             table = _with_one_velocity(table, problems)
-        table = clean_rows(table, set(table.columns) - _OPTIONAL[stream], problems)
-        if len(table) < 2:
+        try:
+            table = _clean(stream, table, problems)
+        except UnusableStreamError as error:
+            reason = str(error)
+        if not reason and len(table) < 2:
             reason = f"{file}: has {len(table)} usable row(s) and needs 2; record it again"
     if reason and stream == "imu":
         raise RecordingError(reason)
@@ -447,16 +503,32 @@ def _stream(
         problems.append(f"{reason}; the stream is left out")
         return None
     if "time" not in stated:
-        check_time_unit(table, _SLOWEST[stream])
+        check_time_unit(table, stream, tables)
     if stream == "imu":
-        table = _in_body_axes(table, stated, axes, problems)
-    elif stream == "wheel" and "speed" not in table.columns:
-        table.insert(1, "speed", table[[name for name in WHEELS if name in table.columns]].mean(axis=1))
+        table = _in_body_axes(without_filled_stretches(table, problems), stated, axes, problems)
+    elif stream == "wheel":
+        table = _with_one_speed(table, problems)
     elif stream == "gnss":
-        table = _with_velocity(table, stated)
+        table = without_frozen_fixes(_with_velocity(table, stated), problems)
     elif stream == "reference" and "attitude" not in stated:
         check_attitude_unit(table)
     return table.set_index("t")
+
+
+def _clean(stream: str, table: pd.DataFrame, problems: list[str]) -> pd.DataFrame:
+    table = without_impossible_values(table, stream, problems)
+    table = clean_rows(table, set(table.columns) - _OPTIONAL[stream], problems)
+    if len(table) < 2:
+        return table
+    return without_shared_stamps(steady(table, problems), stream, problems)
+
+
+def _with_one_speed(table: pd.DataFrame, problems: list[str]) -> pd.DataFrame:
+    if "speed" not in table.columns:
+        wheels = [name for name in WHEELS if name in table.columns]
+        table = without_dead_wheels(table, wheels, problems)
+        table.insert(1, "speed", table[[name for name in wheels if name in table.columns]].mean(axis=1))
+    return without_frozen_speeds(table, problems)
 
 
 def _with_whole_gyro(table: pd.DataFrame, problems: list[str]) -> pd.DataFrame:
@@ -498,7 +570,7 @@ def _in_body_axes(table: pd.DataFrame, stated: Collection[str], axes: str, probl
             table = table.assign(**dict(zip(triad, rotated, strict=True)))
     if "accelerometer" not in stated:
         problems += check_accelerometer_unit(table)
-    problems += check_gravity(table, axes)
     if "gx" in table.columns and "gyro" not in stated:
         check_gyro_unit(table)
+    problems += check_ranges(table)
     return table

@@ -19,7 +19,10 @@ COLUMNS = {
 }
 
 _UNITS: dict[str, tuple[dict[str, float], dict[str, tuple[str, ...]]]] = {
-    "time": ({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}, {stream: ("t",) for stream in COLUMNS}),
+    "time": (
+        {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0, "d": 86400.0},
+        {stream: ("t",) for stream in COLUMNS},
+    ),
     "accelerometer": (
         {
             "m/s^2": 1.0,
@@ -31,7 +34,18 @@ _UNITS: dict[str, tuple[dict[str, float], dict[str, tuple[str, ...]]]] = {
         },
         {"imu": ("ax", "ay", "az")},
     ),
-    "gyro": ({"rad/s": 1.0, "deg/s": np.pi / 180}, {"imu": ("gx", "gy", "gz")}),
+    "gyro": (
+        {
+            "rad/s": 1.0,
+            "deg/s": np.pi / 180,
+            "mrad/s": 1e-3,
+            "mdeg/s": np.pi / 180e3,
+            "deg/h": np.pi / 648e3,
+            "-rad/s": -1.0,
+            "-deg/s": -np.pi / 180,
+        },
+        {"imu": ("gx", "gy", "gz")},
+    ),
     "speed": (SPEED_UNITS, {"wheel": ("speed", *WHEELS)}),
     "gnss_speed": (SPEED_UNITS, {"gnss": ("v_e", "v_n", "v_u", "speed", "climb", "sd_e", "sd_n", "sd_u")}),
     "height": ({"m": 1.0, "ft": 0.3048}, {"gnss": ("alt",), "reference": ("alt",)}),

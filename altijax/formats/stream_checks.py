@@ -9,13 +9,11 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
-from altijax.constants import KNOT
+from altijax.constants import KNOT, STANDARD_GRAVITY
 
-LETTERS = {"F": (1, 0, 0), "B": (-1, 0, 0), "L": (0, 1, 0), "R": (0, -1, 0), "U": (0, 0, 1), "D": (0, 0, -1)}
-"""Directions on the vehicle in body axes (forward, left, up)."""
-
-SPEED_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704, "kn": KNOT}
+SPEED_UNITS = {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704, "kn": KNOT, "cm/s": 1e-2, "mm/s": 1e-3}
 """m/s in each unit of speed; the mile is 1609.344 m."""
 
 
@@ -27,43 +25,8 @@ class RecordingWarning(UserWarning):
     """Part of a recording was left out or looks wrong; the rest is usable."""
 
 
-def axes_to_matrix(axes: str) -> np.ndarray:
-    """Rotation from sensor axes to body axes (forward, left, up).
-
-    Parameters
-    ----------
-    axes : str
-        Where the sensor's x, y and z point on the vehicle, one letter each: F or B (forward, backward), L or R (left,
-        right), U or D (up, down).
-
-    Returns
-    -------
-    C : (3, 3)
-        Maps sensor vectors to body vectors.
-
-    Raises
-    ------
-    ValueError
-        If `axes` is not three letters, one of each pair, forming right-handed axes.
-    """
-    wrong = None
-    if len(axes) != 3 or not set(axes) <= set(LETTERS):
-        wrong = "needs three letters out of F/B, L/R, U/D"
-    else:
-        C = np.array([LETTERS[letter] for letter in axes], dtype=float).T
-        if np.linalg.matrix_rank(C) < 3:
-            wrong = "needs one letter of each pair F/B, L/R, U/D"
-        elif np.linalg.det(C) < 0:
-            wrong = "is left-handed"
-    if wrong:
-        likeness = {code: _likeness(code, axes) for code in _right_handed()}
-        near = [code for code in likeness if likeness[code] == max(likeness.values())][:3]
-        raise ValueError(f"axes {axes!r} {wrong}; right-handed and near it: {', '.join(near)}")
-    return C
-
-
 def clean_rows(table: pd.DataFrame, needed: Collection[str], problems: list[str]) -> pd.DataFrame:
-    """The rows of a table that have a value in every needed column, times increasing."""
+    """The rows of a table that have a value in every needed column."""
     file, line = table.attrs["file"], table.index.name
     keep = np.ones(len(table), bool)
     for column in table.columns:
@@ -80,134 +43,97 @@ def clean_rows(table: pd.DataFrame, needed: Collection[str], problems: list[str]
                 keep &= ~bad
             else:
                 table = table.assign(**{column: np.where(bad, np.nan, values)})
-    table = table[keep]
-    if table.empty:
-        return table
-    t = table["t"].to_numpy(float)
-    backwards = np.flatnonzero(np.diff(t) < 0)
-    if backwards.size:
-        k = backwards[0]
-        raise RecordingError(
-            f"{file}, {line} {table.index[k + 1]}, column t: time runs backwards, from {t[k]:.6f} to {t[k + 1]:.6f} "
-            f"({backwards.size} times in all); sort the rows, or cut the file where its clock was set"
-        )
-    repeated = np.append(False, np.diff(t) == 0)
-    if repeated.any():
-        problems.append(
-            f"{file}, {line} {table.index[repeated][0]}, column t: {t[repeated][0]:.6f} repeats the time of the row "
-            f"before; rows like it: {repeated.sum()} of {len(table)}, dropped"
-        )
-    return table[~repeated]
-
-
-def check_time_unit(table: pd.DataFrame, slowest: float) -> None:
-    """Raise if rows are further apart than `slowest` seconds, as they are when the time is not in seconds."""
-    interval = float(np.median(np.diff(table["t"].to_numpy(float))))
-    if interval > slowest:
-        likely = [unit for unit, s in (("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9)) if interval * s <= slowest]
-        unit = likely[0] if likely else "ns"
-        raise RecordingError(
-            f"{table.attrs['file']}, column t: rows are {interval:g} s apart, as if t were in {unit}; read with "
-            f"units={{'time': '{unit}'}}, which holds for every file of the recording ('s' if seconds are meant)"
-        )
-
-
-def check_accelerometer_unit(imu: pd.DataFrame) -> Iterator[str]:
-    """Raise if the accelerometer reads in g or gal; yield a sentence if its size is otherwise unlike gravity."""
-    size = float(np.median(np.linalg.norm(imu[["ax", "ay", "az"]].to_numpy(), axis=1)))
-    seen = f"{imu.attrs['file']}, columns ax, ay, az: the median of |a| is {size:.4g} m/s^2, at rest it is 9.8"
-    for unit, low, high, other in (("g", 0.7, 1.4, ""), ("gal", 700, 1400, " or mg")):
-        if low < size < high:
-            raise RecordingError(
-                f"{seen}; that looks like {unit}{other}: read with units={{'accelerometer': '{unit}'}} "
-                "('m/s^2' if it is right as it stands)"
-            )
-    if not 5 < size < 20:
-        yield f"{seen}; check the unit, and that gravity was not taken out (specific force is wanted)"
+    return table[keep]
 
 
 _LARGEST = 1e100
 """No quantity reaches it, and what exceeds its square cannot be told from infinity."""
 
-_IOS = (
-    ", if the sensor hangs that way; if it is an iPhone's, it has all three signs reversed, which no axes code mends: "
-    "read with units={'accelerometer': '-m/s^2'} ('-g' if it is in g)"
-)
 
+def check_accelerometer_unit(imu: pd.DataFrame) -> Iterator[str]:
+    """Raise if the accelerometer reads in g, mg, gal or counts; yield a sentence if it is otherwise unlike gravity.
 
-def check_gravity(imu: pd.DataFrame, axes: str) -> Iterator[str]:
-    """Yield a sentence with a better axes code if gravity does not point up after `axes` was applied."""
-    mean = imu[["ax", "ay", "az"]].to_numpy().mean(axis=0)
-    if mean[2] == np.abs(mean).max():
+    At rest it reads 9.8 m/s^2, on the road about so in the median.
+    """
+    force = imu[["ax", "ay", "az"]].to_numpy()
+    size = float(np.median(np.linalg.norm(force, axis=1)))
+    seen = f"{imu.attrs['file']}, columns ax, ay, az: the median of |a| is {size:.4g} m/s^2, at rest it is 9.8"
+    if 7.5 < size < 13:
         return
-    sensor = axes_to_matrix(axes).T @ mean
-    k = int(np.abs(sensor).argmax())
-    up = [code for code in _right_handed() if code[k] == ("U" if sensor[k] > 0 else "D")]
-    ahead = axes.index("F" if "F" in axes else "B")
-    best = max(up, key=lambda code: (_likeness(code, axes), code[ahead] == axes[ahead]))
-    seen = ", ".join(f"{component:.2f}" for component in mean)
+    if np.linalg.norm(force.mean(axis=0)) < 0.5 * size:
+        # Gravity does not change; what is left without it, or turns about, has no lasting direction.
+        if size < 7.5:
+            yield (
+                f"{seen}, and they have no lasting direction: gravity was taken out; specific force is wanted, so "
+                f"log the "
+                "acceleration with gravity"
+            )
+        elif size > 20:
+            yield f"{seen}, and they have no lasting direction; check the unit"
+        return
+    # A sensor's scale is within some percent, so mg and gal, 2 % apart, are told by the nearer.
+    for unit, low, high in (("g", 0.7, 1.4), ("gal", 700, 990), ("mg", 990, 1400)):
+        if low < size < high:
+            raise RecordingError(
+                f"{seen}; that looks like {unit}: read with units={{'accelerometer': '{unit}'}} ('m/s^2' if it is "
+                f"right as "
+                "it stands)"
+            )
+    if size > 200:
+        raise RecordingError(
+            f"{seen}; that looks like raw counts, {size:.5g} of them in 1 g: divide ax, ay, az by "
+            f"{_counts(size):.5g} and read "
+            "with units={'accelerometer': 'g'} ('m/s^2' if it is right as it stands)"
+        )
+    times = size / STANDARD_GRAVITY
     yield (
-        f"{imu.attrs['file']}, columns ax, ay, az: with axes={axes!r} the mean is ({seen}) m/s^2 forward, left, up, "
-        f"so gravity is not up; axes={best!r} would put it there"
-        f"{_IOS if -mean[2] == np.abs(mean).max() else ''}"
+        f"{seen}: it reads {times:.3g} g; the range of the sensor was taken for another: divide ax, ay, az by "
+        f"{times:.3g}, or "
+        "check that gravity was not taken out (specific force is wanted)"
     )
 
 
+def _counts(size: float) -> float:
+    """Counts in one g: of the usual ones the nearest, within 5 %."""
+    usual = min((2.0**k for k in range(8, 17)), key=lambda counts: abs(np.log(size / counts)))
+    return usual if abs(np.log(size / usual)) < 0.05 else size
+
+
 def check_gyro_unit(imu: pd.DataFrame) -> None:
-    """Raise if the vehicle would be spinning, as it seems to when the gyro reads in deg/s."""
+    """Raise if the vehicle spins, as it seems to where the gyro reads in deg/s, and gravity does not turn so."""
     rate = np.linalg.norm(imu[["gx", "gy", "gz"]].to_numpy(), axis=1)
     typical, highest = float(np.median(rate)), float(np.quantile(rate, 0.999))
-    if typical > 2 or highest > 35:
+    if (typical > 2 or highest > 35) and not _turns_gravity(imu):
+        likely = "deg/s" if typical < 60 else "deg/s, mrad/s or counts"
         raise RecordingError(
             f"{imu.attrs['file']}, columns gx, gy, gz: the median rate is {typical:.3g} rad/s and 0.1 % exceed "
-            f"{highest:.3g}; that looks like deg/s: read with units={{'gyro': 'deg/s'}} ('rad/s' if it turns that fast)"
+            f"{highest:.3g}, but gravity does not turn so; that looks like {likely}: read with "
+            f"units={{'gyro': 'deg/s'}} "
+            "('rad/s' if it turns that fast)"
         )
 
 
-def check_turns(imu: pd.DataFrame, gnss: pd.DataFrame, gyro_unit_stated: bool) -> Iterator[str]:
-    """Compare gyro and course over the turns driven: raise for deg/s, yield a sentence for the wrong sign."""
-    t, t_gnss = imu.index.to_numpy(float), gnss.index.to_numpy(float)
-    v_e, v_n, rate = gnss["v_e"].to_numpy(), gnss["v_n"].to_numpy(), imu["gz"].to_numpy()
-    window = max(5.0, 2 * float(np.median(np.diff(t_gnss))))
-    edges = np.arange(max(t[0], t_gnss[0]), min(t[-1], t_gnss[-1]), window)
-    turned = np.append(0, np.cumsum(np.diff(t) * (rate[1:] + rate[:-1]) / 2))
-    by_gyro = np.diff(np.interp(edges, t, turned))
-    by_course = np.diff(np.interp(edges, t_gnss, np.unwrap(np.arctan2(v_n, v_e))))
-    # A slow sample on either side of an edge spoils the course at that edge.
-    slow = np.append(0, np.cumsum(np.hypot(v_e, v_n) < 3))
-    first = np.maximum(np.searchsorted(t_gnss, edges) - 1, 0)
-    last = np.searchsorted(t_gnss, edges, side="right") + 1
-    moving = slow[np.minimum(last[1:], len(t_gnss))] == slow[first[:-1]]
-    by_gyro, by_course = by_gyro[moving], by_course[moving]
-    if by_course.size < 3 or np.sqrt(np.mean(by_course**2)) < 0.1 or np.corrcoef(by_gyro, by_course)[0, 1] ** 2 < 0.5:
-        return
-    ratio = float(by_gyro @ by_course / (by_course @ by_course))
-    seen = f"{imu.attrs['file']}, column gz: the gyro turns {ratio:.2g} times as far as the GNSS course"
-    if abs(ratio) > 20 and not gyro_unit_stated:
-        raise RecordingError(
-            f"{seen}; that looks like deg/s: read with units={{'gyro': 'deg/s'}} ('rad/s' if it is right)"
-        )
-    if ratio < 0:
-        yield f"{seen}, to the other side; a left turn is positive: check the axes code and the signs of gx, gy, gz"
-
-
-def check_wheel_unit(wheel: pd.DataFrame, gnss: pd.DataFrame) -> None:
-    """Raise if wheel and GNSS speeds differ by the ratio of two units of speed."""
-    t = wheel.index.to_numpy(float)
-    t_gnss, speed = gnss.index.to_numpy(float), np.hypot(gnss["v_e"].to_numpy(), gnss["v_n"].to_numpy())
-    by_gnss = np.interp(t, t_gnss, speed, left=0, right=0)
-    moving = by_gnss > 2
-    if moving.sum() < 10:
-        return
-    ratio = float(np.median(wheel["speed"].to_numpy()[moving] / by_gnss[moving]))
-    for unit, factor in SPEED_UNITS.items():
-        for file, key, expected in ((wheel, "speed", 1 / factor), (gnss, "gnss_speed", factor)):
-            if unit != "m/s" and abs(ratio / expected - 1) < 0.08:
-                raise RecordingError(
-                    f"{wheel.attrs['file']} and {gnss.attrs['file']}: the wheels' speed is {ratio:.3g} times that of "
-                    f"GNSS; {file.attrs['file']} looks like {unit}: read with units={{'{key}': '{unit}'}} ('m/s' if "
-                    "it is right)"
-                )
+def _turns_gravity(imu: pd.DataFrame) -> bool:
+    """Whether gravity stands still if the gyro is followed as it is, better than if it were in deg/s."""
+    t = imu["t"].to_numpy(float)
+    dt = np.diff(t, prepend=t[0])[:, None]
+    # In three seconds accelerations are averaged, and a gyro's bias turns nothing away.
+    rows = max(round(3.0 / float(np.median(np.diff(t)))), 2)
+    windows = t.size // rows
+    if windows < 5:
+        return False
+    f = imu[["ax", "ay", "az"]].to_numpy()[: windows * rows].reshape(windows, rows, 3)
+    spreads = []
+    for factor in (1.0, np.pi / 180):
+        turns = Rotation.from_rotvec(factor * (imu[["gx", "gy", "gz"]].to_numpy() * dt)[: windows * rows]).as_matrix()
+        turns = turns.reshape(windows, rows, 3, 3)
+        C, total = np.broadcast_to(np.eye(3), (windows, 3, 3)), np.zeros((windows, 3))
+        for k in range(rows):
+            C = C @ turns[:, k]
+            total += (C @ f[:, k, :, None])[..., 0]
+        size = np.linalg.norm(total / rows, axis=1)
+        spreads.append(float(np.median(np.abs(size - np.median(size)))))
+    return spreads[0] < spreads[1]
 
 
 def check_position(gnss: pd.DataFrame, problems: list[str]) -> pd.DataFrame:
@@ -270,8 +196,8 @@ def check_overlap(stream: pd.DataFrame, imu: pd.DataFrame) -> Iterator[str]:
         )
 
 
-def check_together(streams: dict[str, pd.DataFrame | None], stated: Collection[str], problems: list[str]) -> None:
-    """Compare streams, indexed by t, with each other; one that shares no moment with the IMU becomes None."""
+def check_together(streams: dict[str, pd.DataFrame | None], problems: list[str]) -> None:
+    """A stream, indexed by t, that shares no moment with the IMU becomes None."""
     imu = streams["imu"]
     if imu is None:
         return
@@ -281,17 +207,3 @@ def check_together(streams: dict[str, pd.DataFrame | None], stated: Collection[s
         if apart:
             problems += apart
             streams[name] = None
-    wheel, gnss = streams["wheel"], streams["gnss"]
-    if gnss is not None and "gx" in imu.columns:
-        problems += check_turns(imu, gnss, "gyro" in stated)
-    if gnss is not None and wheel is not None and not {"speed", "gnss_speed"} & set(stated):
-        check_wheel_unit(wheel, gnss)
-
-
-def _right_handed() -> list[str]:
-    codes = [x + y + z for x in LETTERS for y in LETTERS for z in LETTERS]
-    return [c for c in codes if np.linalg.det(np.array([LETTERS[letter] for letter in c])) > 0.5]
-
-
-def _likeness(code: str, other: str) -> int:
-    return sum(a == b for a, b in zip(code, other, strict=False))

@@ -16,6 +16,7 @@ import numpy as np
 import pandas as pd
 
 from altijax.formats.quantities import COLUMNS, QUANTITIES, WHEELS, check_units
+from altijax.formats.stamps import steady
 from altijax.formats.stream_checks import RecordingError, check_overlap, clean_rows
 from altijax.formats.tables import Log
 from altijax.formats.text_tables import is_clock, layout_of, read_columns, seconds
@@ -98,7 +99,8 @@ def wheel_from_pulses(
         return None
     times = {}
     for name in [name for name in WHEELS if (names == name).any()]:
-        t_pulses = clean_rows(pulses.loc[names == name, ["t"]], ("t",), problems)["t"].to_numpy(float)
+        of_wheel = steady(clean_rows(pulses.loc[names == name, ["t"]], ("t",), problems), problems)
+        t_pulses = _without_bounces(of_wheel, name, problems)["t"].to_numpy(float)
         if t_pulses.size < 2:
             problems.append(f"{file}, column wheel: {name} has {t_pulses.size} pulse, too few for a speed; left out")
         else:
@@ -118,6 +120,19 @@ def wheel_from_pulses(
     table.index = pd.RangeIndex(1, 1 + len(table), name="row")
     table.attrs["file"] = file
     return table
+
+
+def _without_bounces(pulses: pd.DataFrame, wheel: str, problems: list[str]) -> pd.DataFrame:
+    """The pulses less those that follow another far sooner than the pulses around them do."""
+    steps = pulses["t"].diff()
+    bounces = (steps < 0.2 * steps.rolling(9, center=True, min_periods=3).median()) | (steps == 0)
+    if bounces.any():
+        problems.append(
+            f"{pulses.attrs['file']}, {pulses.index.name} {pulses.index[bounces][0]}, column t: a pulse of {wheel} "
+            f"{1e3 * steps[bounces].iloc[0]:.3g} ms after another, as a contact that bounces gives; pulses like it: "
+            f"{bounces.sum()} of {len(pulses)}, left out"
+        )
+    return pulses[~bounces]
 
 
 @jax.jit
@@ -253,6 +268,9 @@ def _read_parquet(path: Path) -> pd.DataFrame:
 
 def _numbers(table: pd.DataFrame, column: str) -> pd.Series:
     values = table[column]
+    if column == "t" and values.dtype.kind == "u":
+        # A counter of 64 bits about to start again, as a signed number: it goes on through zero, to the last digit.
+        values = values.astype(np.int64)
     if values.dtype.kind in "iuf":
         return values.astype(float)
     text = values.astype(str).str.strip().mask(values.isna(), "")

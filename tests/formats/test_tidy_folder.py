@@ -270,5 +270,7 @@ def test_a_stream_without_one_usable_row_does_not_stop_the_rest(tmp_path):
 
 def test_a_value_beyond_every_quantity_is_left_out(tmp_path):
     imu(tmp_path, with_line(7, "0.5,1e308,0.2,9.8"))
-    with pytest.warns(RecordingWarning, match=r"imu.csv, line 7, column ax: 1e\+308 is not a number"):
+    with pytest.warns(
+        RecordingWarning, match=r"imu.csv, line 7, column ax: 1e\+308 stands for a value that is not known"
+    ):
         assert len(read_recording(tmp_path).imu) == 49
