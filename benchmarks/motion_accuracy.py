@@ -169,7 +169,7 @@ def of_itself(estimate: pd.DataFrame) -> str:
     parts = [f"delay {said['delay']:.3f} s", f"valid {100 * estimate['valid'].mean():.0f} %"]
     parts.append("finite" if np.isfinite(values).all() else "NOT FINITE")
     if "nis" in said:
-        parts.append(f"NIS {said['nis']['velocity']:.2f}, {len(said['rejected'])} outliers")
+        parts.append(f"NIS {said['nis']:.2f}, {said['outliers']} outliers")
         if said["wind"] is not None:
             parts.append("wind {:.1f}, {:.1f} m/s".format(*said["wind"]))
     return ", ".join(parts)

@@ -78,9 +78,11 @@ def estimate_drive(
         ``use``         what was used
         ``constants``   value and standard deviation of each constant by name
         ``noise``       the noise levels
-        ``nis``         mean square of what the measurements of each kind miss, in units of what they may
+        ``nis``         mean square of what the measurements miss, in units of what they may: 1 where bars are right
+        ``nis_by_kind`` the same of each kind of measurement
         ``verdict``     in words, whether the error bars are to be trusted
-        ``rejected``    measurements that were trusted less: time (s), what it is, and size in standard deviations
+        ``rejected``    measurements that were trusted less: time (s), what it is, and size in standard deviations;
+                        ``outliers`` is their number
 
     Raises
     ------
@@ -276,20 +278,23 @@ def summary(search: Search, start: float) -> dict[str, Any]:
         for entry, place in enumerate(range(*layout.at(name).indices(layout.size))):
             label = name if part.size == 1 else f"{name}_{part.entries[entry]}"
             constants[label] = float(value[place]), float(std[place])
-    nis, rejected = {}, []
+    squares, rejected = {}, []
     for name, kind in kinds_of(search.use).items():
         there = np.isfinite(search.rows[name].std)
         surprise, doubt = np.asarray(fit.surprise[name]), search.doubt[name]
         if kind.factor and there.any():
-            nis[name] = float(np.mean(surprise[there] ** 2))
+            squares[name] = surprise[there] ** 2
         for k, row in np.argwhere(there & (doubt > 1)):
             stamp = float(search.rows[name].stamp[k]) + start
             rejected.append((stamp, f"{name} {kind.rows[row]}", float(surprise[k, row])))
+    nis = {name: float(np.mean(each)) for name, each in squares.items()}
     return {
         "use": search.use,
         "constants": constants,
         "noise": dict(search.levels),
-        "nis": nis,
+        "nis": float(np.mean(np.concatenate(list(squares.values())))),
+        "nis_by_kind": nis,
+        "outliers": len(rejected),
         "verdict": _verdict(nis),
         "rejected": sorted(rejected),
     }

@@ -89,7 +89,7 @@ def test_what_comes_back() -> None:
     }
     assert wanted | {f"{name}_std" for name in wanted} | {"lat", "lon", "valid"} == set(found)
     said = found.attrs
-    assert set(said) == {"use", "constants", "noise", "nis", "verdict", "rejected"}
+    assert set(said) == {"use", "constants", "noise", "nis", "nis_by_kind", "outliers", "verdict", "rejected"}
     assert said["use"] == ("gyro", "wheel", "velocity", "course", "standstill")
     assert said["verdict"] == CONSISTENT
     value, std = said["constants"]["gnss_delay"]
