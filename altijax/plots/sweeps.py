@@ -115,15 +115,16 @@ def _map(ax: Axes, result: pd.DataFrame, name: str, limit: float | None, label: 
     )
     norm = (LogNorm if wide else Normalize)(np.nanmin(z), np.nanmax(z))
     mesh = ax.pcolormesh(x, y, z, cmap="cividis", shading="gouraud", norm=norm)
+    # Labels make their gaps in the lines as they are drawn: the scales come first.
+    for values, scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
+        if spaced_by_factors(values):
+            scale("log")
     lines = ax.contour(x, y, z, levels=[level for level in levels if level != limit], colors="w", linewidths=0.8)
     ax.clabel(lines, fmt=_short, fontsize=8)
     if limit is not None and np.nanmin(z) < limit < np.nanmax(z):
         bold = ax.contour(x, y, z, levels=[limit], colors="#D55E00", linewidths=2.5)
         for text in ax.clabel(bold, fmt=lambda level: f"{name} {_short(level)}", fontsize=9):
             text.set(color="k", bbox={"facecolor": "w", "edgecolor": "none", "pad": 1.5})
-    for values, scale in ((x, ax.set_xscale), (y, ax.set_yscale)):
-        if spaced_by_factors(values):
-            scale("log")
     ax.grid(visible=False)
     ax.figure.colorbar(mesh, ax=ax, label=label)
     ax.set(xlabel=str(along), ylabel=str(up), title=f"{name} by {along} and {up}")
