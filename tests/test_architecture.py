@@ -41,7 +41,7 @@ LEVELS = [
     ["agreement.report"],
     ["agreement.messages"],
     ["sweeps", "formats.tables", "formats.quantities", "formats.ubx_frames", "calibration.records"],
-    ["formats.text_tables", "formats.containers", "formats.ubx_solutions", "formats.ubx_ticks"],
+    ["formats.streams", "formats.text_tables", "formats.containers", "formats.ubx_solutions", "formats.ubx_ticks"],
     ["formats.mixed_tables"],
     ["formats.phones"],
     ["formats.sensor_logger", "formats.phyphox", "formats.androsensor", "formats.racechrono", "formats.aim"],
