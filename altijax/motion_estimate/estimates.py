@@ -57,8 +57,8 @@ def estimate_motion(
     -------
     estimate : DataFrame
         Indexed as ``recording.imu``: roll, pitch, heading (rad), v_e, v_n, v_u (m/s), the standard deviation of each
-        (``roll_std`` ...), and valid, False where no GNSS velocity is near or the IMU has a gap. ``attrs["delay"]`` is the
-        delay in s. That of "batch" has also ``climb_delay``, how much later the vertical velocities are than the
+        (``roll_std`` ...), and valid, False where no GNSS velocity is near or the IMU has a gap. ``attrs["delay"]`` is
+        the delay in s. That of "batch" has also ``climb_delay``, how much later the vertical velocities are than the
         horizontal ones (s), ``wind`` (m/s to East and North, or None), and all that `estimate_drive` says of itself.
 
     Raises
