@@ -43,9 +43,9 @@ def test_batch_finds_biases(found: Calibration) -> None:
 def test_value_and_error_are_the_prior_of_the_next_batch(recording: Recording, found: Calibration) -> None:
     constants = estimate_motion(recording, calibration=found).attrs["constants"]
     for name in NAMES[:2]:
-        # It moves by less than the calibration's own error.
-        assert abs(constants[name][0] - found.values[name]) < found.std[name]
-        assert constants[name][1] < 1.2 * found.std[name]
+        # They walk from where the calibration holds them; unheld they would be off by .15 to begin with.
+        assert abs(constants[name][0] - found.values[name]) < 0.01
+        assert constants[name][1] < 0.01
 
 
 @pytest.mark.parametrize("method", ["epoch", "window"])
