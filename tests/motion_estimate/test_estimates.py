@@ -90,7 +90,7 @@ def test_without_a_gyro_the_direction_of_travel_tells_the_attitude() -> None:
     estimate = estimate_motion(recording, use_gyro=False)
     score = score_motion(estimate.loc[6.0:60.0], recording)
     assert (score["rms"] / score["stated_std"]).drop("velocity").max() < 2.0, score
-    assert score.loc["roll", "rms"] < np.radians(4.0) and score.loc["pitch", "rms"] < np.radians(2.0), score
+    assert score.loc["roll", "rms"] < np.radians(5.0) and score.loc["pitch", "rms"] < np.radians(3.5), score
     assert estimate.attrs["climb_delay"] == pytest.approx(0.1, abs=0.05)
 
 
