@@ -11,7 +11,7 @@ import pandas as pd
 from altijax.constants import STANDARD_GRAVITY
 from altijax.earth import gravity_of
 from altijax.recordings import Recording
-from altijax.series import interpolated, supported
+from altijax.series import interpolated, longest_step, supported
 
 # A row that comes later than this after the one before, in s, comes after a gap, not after a pause between bursts.
 _PAUSE = 1.0
@@ -102,7 +102,7 @@ def drive_arrays(recording: Recording, *, turns: bool) -> tuple[Drive, np.ndarra
         f=interpolated(t, t_imu, imu[["ax", "ay", "az"]].to_numpy(float)),
         yaw_rate=_yaw_rate(recording, t) if turns else np.zeros(count),
         gravity=np.asarray(gravity_at(recording)),
-        supported=supported(t, t_imu, max(5 * step, 0.1)) & supported(t, t_speed, max(5 * usual_step(t_speed), 0.5)),
+        supported=supported(t, t_imu, longest_step(step)) & supported(t, t_speed, max(5 * usual_step(t_speed), 0.5)),
         t_speed=t_speed,
         speed=speed,
         from_wheel=np.asarray(recording.wheel is not None),

@@ -25,7 +25,7 @@ from altijax.speed_estimate.steps import aid_of, drive_in_steps, initial_state, 
 DIFFERENTIABLE = ("slope", "shirai", "conventional", "roll", "aided", "epoch")
 """Methods that `differentiable` takes."""
 
-# As `estimate_motion` has them: of the course, rad, and of a mean acceleration over a second, m/s^2.
+# Of the course, rad, and of a mean acceleration over a second, m/s^2; presumed, where "epoch" asks the record.
 _COURSE_STD, _ACCELERATION_STD = 0.3, 0.3
 # The smallest sizes that samples, references and epochs are filled up to.
 _SAMPLES, _REFERENCES, _EPOCHS = 16384, 1024, 64

@@ -79,6 +79,30 @@ def flanked(t: np.ndarray, t_samples: np.ndarray, usual: float) -> np.ndarray:
     return near
 
 
+def longest_step(usual: float) -> float:
+    """The longest interval between samples of an IMU that is no gap, s: five usual ones (s), or a tenth of a second."""
+    return max(5 * usual, 0.1)
+
+
+def after_gap(t: np.ndarray, usual: float) -> np.ndarray:
+    """Whether samples of an IMU come after a gap.
+
+    Parameters
+    ----------
+    t : (samples,) s
+        Their times.
+    usual : float
+        Usual time between them, s.
+
+    Returns
+    -------
+    after_gap : (samples,)
+        True where the interval before is longer than `longest_step`.
+    """
+    gap: np.ndarray = np.diff(t, prepend=t[0]) > longest_step(usual)
+    return gap
+
+
 def means_between(edges: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Means over intervals of samples, the trapezoid between two neighbours spread evenly over the time between them.
 

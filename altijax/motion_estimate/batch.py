@@ -13,7 +13,7 @@ from altijax.recordings import Recording
 from altijax.stages import Stages, stages
 from altijax.vehicle.at_samples import MOTION_COLUMNS, as_table, at_samples
 from altijax.vehicle.beliefs import belief_of
-from altijax.vehicle.estimates import delays_of, summary, supported, warn_of
+from altijax.vehicle.estimates import delays_of, summary, supported
 from altijax.vehicle.search import Search, best_start, fit_of, likely, passed, said_between
 from altijax.vehicle.sensors import Use, layout_of
 from altijax.vehicle.smoother import Belief
@@ -40,9 +40,7 @@ def batch_estimate(
     """What `altijax.estimate_motion` says by "batch"; its arguments are described there."""
     search = _found(recording, use_gyro, wind, delay, calibration, stage)
     stage("between the instants")
-    estimate = _table(recording, search)
-    warn_of(recording, estimate)
-    return estimate
+    return _table(recording, search)
 
 
 def batch_with_constants(recording: Recording) -> Callable[[Calibration], pd.DataFrame]:

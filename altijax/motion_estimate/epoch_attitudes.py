@@ -15,14 +15,14 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from altijax.attitude import RESCUED, AttitudeFit, course_attitude, fit_attitudes, hold_attitudes
 from altijax.delays import estimate_delay
-from altijax.drives import gravity_at, imu_of, start_of
+from altijax.drives import gravity_at, imu_of, start_of, usual_step
 from altijax.least_squares import CONVERGED
-from altijax.motion_estimate.epochs import EPOCHS, Epochs, after_gap, joined_epochs, uniform_forces
+from altijax.motion_estimate.epochs import EPOCHS, Epochs, joined_epochs, uniform_forces
 from altijax.motion_estimate.readings import velocities_within
 from altijax.motion_estimate.start import quick_jit
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
-from altijax.series import flanked
+from altijax.series import after_gap, flanked
 from altijax.vehicle.at_samples import angle_columns
 
 Delay = tuple[float, float]
@@ -265,7 +265,7 @@ def _at_samples(recording: Recording, epochs: Epochs, attitudes: EpochAttitudes,
         by_delay = np.interp(inside, middle, epochs.f_n[:, axis] - (axis == 2) * gravity_at(recording)) * delay[1]
         bars[f"{name}_std"] = np.sqrt(np.interp(t, knots, std**2) + walk * _bridge(t, knots) + by_delay**2)
     stamps = velocities_within(recording, delay[0])[0] - delay[0]
-    valid = flanked(t, stamps, float(np.median(np.diff(stamps)))) & ~after_gap(t)
+    valid = flanked(t, stamps, float(np.median(np.diff(stamps)))) & ~after_gap(t, usual_step(t))
     return pd.DataFrame(angles | bars, index=imu.index).assign(valid=valid)
 
 

@@ -12,9 +12,10 @@ import numpy as np
 
 from altijax.drives import gravity_at, imu_of, start_of, usual_step, without_bursts
 from altijax.motion_estimate.readings import velocities_within
+from altijax.motion_estimate.start import course_rows
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
-from altijax.series import interpolated
+from altijax.series import after_gap, interpolated
 from altijax.signals import fourier_interval_means, periodic_extension
 
 # Samples are reconstructed in blocks of so many seconds or epochs, a quarter at each side to keep the ends away; the
@@ -24,8 +25,6 @@ _BLOCK = 4096
 EPOCHS = 64
 # Doppler noise of 0.05 m/s is 4 degrees in an epoch of 0.1 s: epochs may be joined up to so many seconds.
 _LONGEST = 1.05
-# Below this speed the direction of travel says nothing, m/s.
-_SLOWEST = 1.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,10 +58,7 @@ class Epochs:
     @property
     def course_of(self) -> np.ndarray:
         """Number (epochs,) of the epoch whose course each has: its own, or the last one fast enough to tell."""
-        v = 0.5 * (self.v_n[1:] + self.v_n[:-1])
-        fast = np.hypot(v[:, 0], v[:, 1]) > _SLOWEST
-        last = np.maximum.accumulate(np.where(fast, np.arange(fast.size), -1))
-        return np.where(last < 0, np.argmax(fast), last)
+        return course_rows(0.5 * (self.v_n[1:] + self.v_n[:-1]))
 
     @property
     def length_misfit(self) -> np.ndarray:
@@ -100,7 +96,7 @@ def joined_epochs(recording: Recording, delay: float) -> Epochs:
     dt = np.diff(knots)
     usual = float(np.median(dt))
     t_imu = imu_of(recording).index.to_numpy(float) - start_of(recording)
-    missing = np.where(after_gap(t_imu), np.diff(t_imu, prepend=t_imu[0]), 0.0)
+    missing = np.where(after_gap(t_imu, usual_step(t_imu)), np.diff(t_imu, prepend=t_imu[0]), 0.0)
     lost = np.diff(np.interp(knots, t_imu, np.cumsum(missing)))
     whole = (lost == 0) & (dt < 2 * usual)
     single = np.concatenate(list(_fourier_means(t, f_b, knots)))
@@ -161,21 +157,3 @@ def _block_means(t: jax.Array, values: jax.Array, edges: jax.Array) -> jax.Array
     middle = 0.5 * (edges[1:] + edges[:-1])
     slope = (line[:, -1] - line[:, 0]) / (t[-1] - t[0])
     return fourier_interval_means(t_continued, continued, edges).T + line[:, 0] + middle[:, None] * slope
-
-
-def after_gap(t: np.ndarray) -> np.ndarray:
-    """Whether samples of the IMU come after a gap.
-
-    Parameters
-    ----------
-    t : (samples,) s
-        Their times.
-
-    Returns
-    -------
-    after_gap : (samples,)
-        True where five usual steps or more are missing, and a tenth of a second.
-    """
-    dt = np.diff(t, prepend=t[0])
-    gap: np.ndarray = dt > max(5 * float(np.median(dt)), 0.1)
-    return gap

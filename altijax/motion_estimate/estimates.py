@@ -14,6 +14,7 @@ from altijax.motion_estimate.epoch_attitudes import epoch_estimate
 from altijax.motion_estimate.window import window_estimate
 from altijax.recordings import Recording
 from altijax.stages import stages
+from altijax.vehicle.estimates import warn_of
 
 MOTION_METHODS = ("epoch", "window", "batch")
 
@@ -73,9 +74,11 @@ def estimate_motion(
     use_gyro = use_gyro and "gx" in imu_of(recording)
     with jax.enable_x64(True), stages(f"motion of {recording.name} by {method}") as stage:
         if method == "batch":
-            return batch_estimate(
+            estimate = batch_estimate(
                 recording, use_gyro=use_gyro, wind=wind, delay=delay, calibration=calibration, stage=stage
             )
+            warn_of(recording, estimate)
+            return estimate
         corrected = replace(recording, imu=correct_imu(imu_of(recording), calibration))
         calibrated = calibration is not None and "gnss_delay" in calibration.values
         known, variance = prior_of(["gnss_delay"], calibration)

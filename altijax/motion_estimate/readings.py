@@ -8,6 +8,7 @@ from altijax.drives import gnss_velocities, gravity_at, imu_of, start_of
 from altijax.motion_estimate.intervals import MotionReadings
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
+from altijax.series import after_gap
 
 _ACCELEROMETER, _GYRO = ["ax", "ay", "az"], ["gx", "gy", "gz"]
 # The smallest sizes that samples, instants and steps are filled up to, so that recordings of like length share what was
@@ -125,7 +126,7 @@ def summed_readings(t: np.ndarray, usual: float, readings: np.ndarray) -> dict[s
     arrays : dict of str to ndarray
         By these names.
     """
-    gaps = np.append(np.diff(t) > max(5 * usual, 0.1), False)
+    gaps = np.append(after_gap(t, usual)[1:], False)
     readings = np.concatenate([readings, np.zeros((t.size, 1))], -1)
     pad = bucket(t.size + int(np.ceil(_BEYOND / usual)), _SAMPLES) - t.size
     t = np.append(t, t[-1] + usual * np.arange(1, pad + 1))

@@ -143,10 +143,15 @@ def _matrices(rotvec: np.ndarray) -> np.ndarray:
 
 def _course(v: np.ndarray) -> np.ndarray:
     """Direction of travel, counter-clockwise from East, held where it is too slow to tell."""
+    k = course_rows(v)
+    return np.arctan2(v[k, 1], v[k, 0])
+
+
+def course_rows(v: np.ndarray) -> np.ndarray:
+    """Of each velocity (time, 3), m/s, the row whose course it has: its own, or the last one fast enough to tell."""
     fast = np.hypot(v[:, 0], v[:, 1]) > _SLOWEST
     last = np.maximum.accumulate(np.where(fast, np.arange(len(v)), -1))
-    k = np.where(last < 0, np.argmax(fast), last)
-    return np.arctan2(v[k, 1], v[k, 0])
+    return np.where(last < 0, np.argmax(fast), last)
 
 
 def epochs_within(count: float) -> int:

@@ -19,7 +19,7 @@ from altijax.calibration.records import Calibration
 from altijax.drives import imu_of, start_of
 from altijax.padding import bucket, padded
 from altijax.recordings import Recording
-from altijax.series import interpolated
+from altijax.series import after_gap, interpolated
 from altijax.speed_estimate.dead_reckoning import Start, reckon
 from altijax.speed_estimate.filter import MARGIN, SpeedState, filter_speed, first_state
 from altijax.speed_estimate.model import SENSORS, SpeedNoise, state_names
@@ -120,8 +120,7 @@ def estimate_speed(
         if known is not None:
             stage("dead reckoning")
             dead_reckon(estimate, drive, known, method)
-        gap = np.diff(drive.t, prepend=drive.t[0]) > max(5 * drive.usual, 0.1)
-        estimate["valid"] &= ~gap
+        estimate["valid"] &= ~after_gap(drive.t, drive.usual)
         estimate.index = imu_of(recording).index
     return estimate
 

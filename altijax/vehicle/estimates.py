@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from altijax.calibration.records import Calibration
 from altijax.drives import gnss_velocities, imu_of, speed_readings, start_of, usual_step
 from altijax.recordings import Recording
-from altijax.series import flanked
+from altijax.series import after_gap, flanked
 from altijax.stages import Stages, stages
 from altijax.vehicle.at_samples import Samples, as_table, at_samples
 from altijax.vehicle.beliefs import belief_of
@@ -118,7 +118,7 @@ def estimate_drive(
 
 
 def warn_of(recording: Recording, estimate: pd.DataFrame) -> None:
-    """Warn where measurements contradict each other: the caller's caller is who asked."""
+    """Warn where measurements contradict each other, at the line that called the verb which calls this."""
     if estimate.attrs["verdict"] != CONSISTENT:
         warnings.warn(f"recording {recording.name!r}: {estimate.attrs['verdict']}", stacklevel=3)
 
@@ -261,8 +261,7 @@ def supported(recording: Recording, sources: Use) -> np.ndarray:
         streams.append(found[0] + start_of(recording))
     for stamps in streams:
         near |= flanked(t, stamps, usual_step(stamps) if stamps.size > 1 else 1.0)
-    usual = usual_step(t - t[0])
-    return near & ~(np.diff(t, prepend=t[0]) > max(5 * usual, 0.1))
+    return near & ~after_gap(t, usual_step(t - t[0]))
 
 
 def summary(search: Search, start: float) -> dict[str, Any]:

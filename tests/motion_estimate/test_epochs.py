@@ -8,8 +8,9 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from altijax.motion_estimate.epochs import after_gap, joined_epochs, uniform_forces
+from altijax.motion_estimate.epochs import joined_epochs, uniform_forces
 from altijax.recordings import Recording
+from altijax.series import after_gap
 
 GRAVITY = 9.80665
 
@@ -64,7 +65,7 @@ def test_epochs_with_gaps_are_not_whole() -> None:
     without = recording.gnss[(recording.gnss.index < 30) | (recording.gnss.index > 33)]
     assert list(np.flatnonzero(~joined_epochs(replace(recording, gnss=without), 0.0).whole)) == [27]
     t = np.delete(np.arange(0, 1, 0.02), np.arange(10, 17))
-    assert list(np.flatnonzero(after_gap(t))) == [10]
+    assert list(np.flatnonzero(after_gap(t, 0.02))) == [10]
 
 
 def test_the_grid_has_the_usual_rate() -> None:
