@@ -60,7 +60,13 @@ def _instants(epochs: np.ndarray, end: float, delay: float, longest: float) -> t
     """The epochs and instants between them and beyond, and whether each is on the receiver's clock."""
     known = np.concatenate([[delay], epochs, [end + delay]])
     known = known[np.append(True, np.diff(known) > 1e-6)]
-    parts = np.maximum(1, np.ceil(np.diff(known) / longest - 0.5)).astype(int)
+    steps = np.diff(known)
+    parts = np.maximum(1, np.ceil(steps / longest - 0.5)).astype(int)
+    # All intervals are filled up to the longest one: what is left over at the ends must not be longer than the others.
+    widest = float(np.max((steps / parts)[1:-1], initial=0.0))
+    for end in (0, -1):
+        if steps[end] < 2 * longest and widest > 0:
+            parts[end] = np.ceil(steps[end] / widest - 1e-9)
     between = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(known[:-1], known[1:], parts, strict=True)]
     instant = np.concatenate([known[:1], *between])
     inside = (instant >= epochs[0]) & (instant <= epochs[-1]) if epochs.size else np.zeros(instant.size, bool)
